@@ -1,0 +1,1 @@
+//! Cameras, tiles and ray generation. (being built)

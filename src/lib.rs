@@ -1,0 +1,37 @@
+//! lanecast traces rays in SIMD lanes: coherent tiles of rays, packets of 4, 8 or 16 lanes, a flattened 8-wide BVH
+//! over structure-of-arrays primitives, HDR output, and a measuring bench that checks every hit before it is timed.
+//!
+//! # The house
+//! Each floor uses only those below it; `tests/layers.rs` refuses an upward edge.
+//!
+//! | floor | modules | what lives there |
+//! |---|---|---|
+//! | 8 | [`cli`] | arguments, commands, progress, exit codes |
+//! | 7 | [`measure`] | ray sets, timing, statistics, verification, reports |
+//! | 6 | [`render`], [`reference`] | the tile scheduler; the f64 oracle (floors 0, 3 and 5 only) |
+//! | 5 | [`film`], [`shade`] | framebuffer and image files; materials, lights, integrators |
+//! | 4 | [`trace`] | the engines behind one trait |
+//! | 3 | [`scene`], [`camera`] | description, importers, world; cameras, tiles, ray generation |
+//! | 2 | [`bvh`], [`shape`] | trees over boxes; primitives: storage, bounds, kernels |
+//! | 1 | [`ray`] | rays, hits, packets, commit, counters |
+//! | 0 | [`lanes`], [`math`], [`error`] | SIMD lanes, affine maps and boxes, the error type |
+//!
+//! # Conventions
+//! Right-handed space, scene units, radians. Directions need not be unit: `t` is parametric, the same number in
+//! world and local space. Ray segments are closed: `t_min <= t <= t_max`.
+
+pub mod bvh;
+pub mod camera;
+pub mod cli;
+pub mod error;
+pub mod film;
+pub mod lanes;
+pub mod math;
+pub mod measure;
+pub mod ray;
+pub mod reference;
+pub mod render;
+pub mod scene;
+pub mod shade;
+pub mod shape;
+pub mod trace;

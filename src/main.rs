@@ -1,0 +1,4 @@
+//! The `lanecast` binary: parse, run, exit code.
+fn main() -> std::process::ExitCode {
+    lanecast::cli::main()
+}

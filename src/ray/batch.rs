@@ -1,0 +1,160 @@
+//! Batches of rays and hits as structures of arrays.
+//!
+//! A batch is what an engine gets in one call: usually the rays of one 32x32 or 16x16 pixel tile in Morton order.
+//! The arrays are padded with dead rays to a multiple of [`PAD`], so every packet width loads whole vectors.
+
+use crate::lanes::Real;
+
+/// "No primitive", "no instance".
+pub const INVALID_ID: u32 = u32::MAX;
+
+/// Batches are padded to a multiple of this many rays (the widest packet).
+pub const PAD: usize = 16;
+
+/// A batch of rays, world space. `org` and `dir` hold the x, y and z arrays; directions need not be unit.
+/// A ray with `t_max < t_min`, a NaN or infinity in origin or direction, or a zero direction is dead: it misses.
+#[derive(Clone, Debug, Default)]
+pub struct Rays<S> {
+    len: usize,
+    /// Origins: x, y, z arrays of `padded_len` values.
+    pub org: [Vec<S>; 3],
+    /// Directions.
+    pub dir: [Vec<S>; 3],
+    /// Start of the closed segment.
+    pub t_min: Vec<S>,
+    /// End of the closed segment; may be infinite.
+    pub t_max: Vec<S>,
+}
+
+impl<S: Real> Rays<S> {
+    /// `len` dead rays.
+    pub fn new(len: usize) -> Self {
+        let mut rays = Self { len: 0, org: Default::default(), dir: Default::default(), t_min: Vec::new(), t_max: Vec::new() };
+        rays.reset(len);
+        rays
+    }
+
+    /// Makes this a batch of `len` dead rays, keeping the memory.
+    pub fn reset(&mut self, len: usize) {
+        let padded = len.next_multiple_of(PAD);
+        self.len = len;
+        for array in self.org.iter_mut().chain(&mut self.dir).chain([&mut self.t_max]) {
+            array.clear();
+            array.resize(padded, S::from_f64(0.0));
+        }
+        self.t_min.clear();
+        self.t_min.resize(padded, S::from_f64(1.0));
+    }
+
+    /// Number of rays, without padding.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no ray.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Length of the arrays.
+    pub fn padded_len(&self) -> usize {
+        self.t_min.len()
+    }
+
+    /// Sets ray `i`.
+    pub fn set(&mut self, i: usize, org: [S; 3], dir: [S; 3], t_min: S, t_max: S) {
+        for axis in 0..3 {
+            self.org[axis][i] = org[axis];
+            self.dir[axis][i] = dir[axis];
+        }
+        self.t_min[i] = t_min;
+        self.t_max[i] = t_max;
+    }
+
+    /// Makes ray `i` dead.
+    pub fn kill(&mut self, i: usize) {
+        let (zero, one) = (S::from_f64(0.0), S::from_f64(1.0));
+        self.set(i, [zero; 3], [zero; 3], one, zero);
+    }
+
+    /// Origin of ray `i`.
+    pub fn org(&self, i: usize) -> [S; 3] {
+        [self.org[0][i], self.org[1][i], self.org[2][i]]
+    }
+
+    /// Direction of ray `i`.
+    pub fn dir(&self, i: usize) -> [S; 3] {
+        [self.dir[0][i], self.dir[1][i], self.dir[2][i]]
+    }
+
+    /// Whether ray `i` can hit anything: finite, a direction, a segment that is not empty.
+    pub fn is_live(&self, i: usize) -> bool {
+        let finite = self.org(i).into_iter().chain(self.dir(i)).all(|x| x.to_f64().is_finite());
+        let zero = S::from_f64(0.0);
+        finite && self.dir(i).iter().any(|&d| d != zero) && self.t_min[i] <= self.t_max[i]
+    }
+
+    /// Number of live rays.
+    pub fn live_count(&self) -> usize {
+        (0..self.len).filter(|&i| self.is_live(i)).count()
+    }
+}
+
+/// Hits of a batch. A miss has `t` = infinity and both ids [`INVALID_ID`].
+#[derive(Clone, Debug, Default)]
+pub struct Hits<S> {
+    len: usize,
+    /// Ray parameter.
+    pub t: Vec<S>,
+    /// Triangles: weight of the second corner. Analytic shapes: number of the face that was hit (see `shape`).
+    pub u: Vec<S>,
+    /// Triangles: weight of the third corner. Analytic shapes: 0.
+    pub v: Vec<S>,
+    /// Primitive number inside the instance's object.
+    pub prim: Vec<u32>,
+    /// Instance number.
+    pub inst: Vec<u32>,
+}
+
+impl<S: Real> Hits<S> {
+    /// `len` misses.
+    pub fn new(len: usize) -> Self {
+        let mut hits = Self { len: 0, t: Vec::new(), u: Vec::new(), v: Vec::new(), prim: Vec::new(), inst: Vec::new() };
+        hits.reset(len);
+        hits
+    }
+
+    /// Makes this `len` misses, keeping the memory.
+    pub fn reset(&mut self, len: usize) {
+        let padded = len.next_multiple_of(PAD);
+        self.len = len;
+        for (array, fill) in [(&mut self.t, f64::INFINITY), (&mut self.u, 0.0), (&mut self.v, 0.0)] {
+            array.clear();
+            array.resize(padded, S::from_f64(fill));
+        }
+        for array in [&mut self.prim, &mut self.inst] {
+            array.clear();
+            array.resize(padded, INVALID_ID);
+        }
+    }
+
+    /// Number of hits and misses, without padding.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Whether ray `i` hit something.
+    pub fn is_hit(&self, i: usize) -> bool {
+        self.prim[i] != INVALID_ID
+    }
+
+    /// Number of rays that hit something.
+    pub fn hit_count(&self) -> usize {
+        self.prim[..self.len].iter().filter(|&&p| p != INVALID_ID).count()
+    }
+}

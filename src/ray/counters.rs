@@ -1,0 +1,39 @@
+//! What an engine did: tests and lanes, counted by kernels compiled with counting on.
+
+/// Counts of one traversal run. "Lane" counts are sums over tests of (active, total) lanes, so lane use is
+/// `active / total`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Rays traced (live ones).
+    pub rays: u64,
+    /// Inner nodes visited by packets (or single rays).
+    pub nodes: u64,
+    /// Box tests (one child against one packet).
+    pub boxes: u64,
+    /// Leaves visited.
+    pub leaves: u64,
+    /// Primitive tests (one primitive against one packet).
+    pub prims: u64,
+    /// Lanes wanted in node visits.
+    pub node_lanes_active: u64,
+    /// Lanes paid for in node visits.
+    pub node_lanes_total: u64,
+    /// Lanes wanted in primitive tests.
+    pub prim_lanes_active: u64,
+    /// Lanes paid for in primitive tests.
+    pub prim_lanes_total: u64,
+}
+
+impl std::ops::AddAssign for Counters {
+    fn add_assign(&mut self, o: Self) {
+        self.rays += o.rays;
+        self.nodes += o.nodes;
+        self.boxes += o.boxes;
+        self.leaves += o.leaves;
+        self.prims += o.prims;
+        self.node_lanes_active += o.node_lanes_active;
+        self.node_lanes_total += o.node_lanes_total;
+        self.prim_lanes_active += o.prim_lanes_active;
+        self.prim_lanes_total += o.prim_lanes_total;
+    }
+}

@@ -1,0 +1,194 @@
+//! The description: what a person wrote. Names, groups, units, f64. Engines never see it; [`super::assembly`]
+//! lowers it to numbered objects and instances, from which the world (and, independently, the oracle) is built.
+//!
+//! Space: right-handed, lengths in scene units. Angles are radians here (degrees only in files). An affine map
+//! takes points of the item's local space to its parent's.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::mesh::Mesh;
+
+/// Index into [`Description::groups`].
+pub type GroupId = u32;
+/// Index into [`Description::materials`].
+pub type MaterialId = u32;
+
+/// A whole scene as described.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// Short name for tables (`sphere-flake`, `sponza_crytek`).
+    pub name: String,
+    /// The file it came from; `None` for built-in scenes.
+    pub source: Option<PathBuf>,
+    /// SHA-256 over everything that determines the scene (file bytes, referenced files, `--set` values), hex.
+    pub hash: String,
+    /// Groups; index 0 is the root. A group may be instanced by items of other groups; there are no cycles.
+    pub groups: Vec<Group>,
+    /// Meshes referenced by items.
+    pub meshes: Vec<Arc<Mesh>>,
+    /// Materials; index 0 is the default material.
+    pub materials: Vec<Material>,
+    /// Lights; empty means the renderer adds a default light from the camera's side.
+    pub lights: Vec<Light>,
+    /// Cameras by name; empty means a default camera that frames the scene.
+    pub cameras: Vec<CameraDescription>,
+    /// Radiance of rays that leave the scene, linear Rec.709.
+    pub background: DVec3,
+    /// Ambient radiance (first-light Whitted model), linear Rec.709.
+    pub ambient: DVec3,
+    /// Precision this scene asks for (`None`: f32).
+    pub precision: Option<Precision>,
+    /// Things worth telling the user (`info` prints them): ignored statements, unknown properties.
+    pub warnings: Vec<String>,
+}
+
+/// Arithmetic of the engines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// f32 lanes: meshes.
+    F32,
+    /// f64 lanes: large or exact models.
+    F64,
+}
+
+/// A named list of items in one local space.
+#[derive(Clone, Debug, Default)]
+pub struct Group {
+    /// Name; empty for anonymous groups.
+    pub name: String,
+    /// The items in the order they were written: this order defines primitive and instance numbers.
+    pub items: Vec<Item>,
+}
+
+/// Something placed in a group.
+#[derive(Clone, Debug)]
+pub struct Item {
+    /// Local space to the group's space.
+    pub transform: DAffine3,
+    /// Material; `None` inherits from the mesh's own material names or the default.
+    pub material: Option<MaterialId>,
+    /// What is placed.
+    pub kind: ItemKind,
+}
+
+/// What an [`Item`] places.
+#[derive(Clone, Debug)]
+pub enum ItemKind {
+    /// An analytic shape in its canonical local space.
+    Shape(Shape),
+    /// A mesh: index into [`Description::meshes`].
+    Mesh(u32),
+    /// An instance of a group: geometry is shared, not copied.
+    Instance(GroupId),
+}
+
+/// Analytic shapes, each in one canonical local space; size and place come from the item's transform.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// Unit sphere at the origin.
+    Sphere,
+    /// The half-space z <= 0; its surface is the plane z = 0 with outward normal +z.
+    HalfSpace,
+    /// The disc x^2 + y^2 <= 1, z = 0 (a surface: it has no inside).
+    Disc,
+    /// The box [-1, 1]^3.
+    Cuboid,
+    /// The capped cylinder x^2 + y^2 <= 1, 0 <= z <= 1.
+    Cylinder,
+    /// The capped cone: radius 1 at z = 0, radius `top` at z = 1, with 0 <= top <= 1 (0 is a pointed cone).
+    Cone {
+        /// Radius at z = 1 relative to the base.
+        top: f64,
+    },
+}
+
+/// A surface material of the first light: Lambert, ambient and a mirror part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name.
+    pub name: String,
+    /// Diffuse reflectance, linear Rec.709, 0..1.
+    pub diffuse: DVec3,
+    /// Mirror reflectance, linear Rec.709, 0..1.
+    pub mirror: DVec3,
+    /// Emitted radiance, linear Rec.709.
+    pub emission: DVec3,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self { name: "default".into(), diffuse: DVec3::splat(0.7), mirror: DVec3::ZERO, emission: DVec3::ZERO }
+    }
+}
+
+/// A light of the first light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// Point light: irradiance at distance r is `intensity` / r^2.
+    Point {
+        /// World position.
+        position: DVec3,
+        /// Radiant intensity, linear Rec.709.
+        intensity: DVec3,
+    },
+    /// Directional light, infinitely far.
+    Directional {
+        /// Direction the light travels (from the light into the scene), need not be unit.
+        direction: DVec3,
+        /// Irradiance on a surface facing the light, linear Rec.709.
+        irradiance: DVec3,
+    },
+}
+
+/// A camera as written in a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraDescription {
+    /// Name for `--camera`.
+    pub name: String,
+    /// Eye point.
+    pub eye: DVec3,
+    /// Point looked at.
+    pub look_at: DVec3,
+    /// Up vector, need not be unit or orthogonal.
+    pub up: DVec3,
+    /// Projection.
+    pub projection: Projection,
+}
+
+/// How a camera projects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Perspective with the *vertical* field of view in radians.
+    Perspective {
+        /// Full vertical angle, radians.
+        theta: f64,
+    },
+    /// Parallel with the height of the view volume in scene units.
+    Parallel {
+        /// Full height, scene units.
+        height: f64,
+    },
+}
+
+impl Description {
+    /// An empty scene with the default material and an empty root group.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            source: None,
+            hash: String::new(),
+            groups: vec![Group::default()],
+            meshes: Vec::new(),
+            materials: vec![Material::default()],
+            lights: Vec::new(),
+            cameras: Vec::new(),
+            background: DVec3::ZERO,
+            ambient: DVec3::splat(0.1),
+            precision: None,
+            warnings: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Indexed triangle meshes as they come from a file: the description side, in f64.
+
+use glam::DVec3;
+
+/// An indexed triangle mesh. Positions keep the file's values (f32 files widen exactly), indices the file's order
+/// and winding; nothing is dropped here, so triangle `i` of the mesh is triangle `i` of the file (polygons are
+/// fanned in place).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertex positions, object space, scene units. May hold non-finite values: they are dropped and counted when
+    /// the world is compiled.
+    pub positions: Vec<DVec3>,
+    /// Vertex indices of each triangle; always in range of `positions`.
+    pub triangles: Vec<[u32; 3]>,
+    /// Runs of triangles with a common material or group, in order, covering all triangles; empty means one
+    /// unnamed run.
+    pub groups: Vec<MeshGroup>,
+}
+
+/// A run of triangles of a [`Mesh`] that share a name (OBJ `g`/`usemtl`).
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct MeshGroup {
+    /// Group or object name, may be empty.
+    pub name: String,
+    /// Material name, may be empty.
+    pub material: String,
+    /// First triangle of the run.
+    pub first: u32,
+    /// Number of triangles.
+    pub count: u32,
+}
+
+impl Mesh {
+    /// The three corners of triangle `i`.
+    pub fn corners(&self, i: usize) -> [DVec3; 3] {
+        self.triangles[i].map(|v| self.positions[v as usize])
+    }
+
+    /// Lower and upper corner of the finite referenced vertices, or `None` if there are none.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let mut range: Option<(DVec3, DVec3)> = None;
+        for &v in self.triangles.iter().flatten() {
+            let p = self.positions[v as usize];
+            if p.is_finite() {
+                range = Some(range.map_or((p, p), |(lo, hi)| (lo.min(p), hi.max(p))));
+            }
+        }
+        range
+    }
+}

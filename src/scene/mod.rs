@@ -1,0 +1,14 @@
+//! Scenes: the description a person writes, importers that read it, the assembly that numbers it, the world that
+//! engines trace.
+
+pub mod assembly;
+pub mod builtin;
+pub mod description;
+pub mod kdl;
+pub mod load;
+pub mod mesh;
+pub mod obj;
+pub mod ply;
+pub mod stl;
+pub mod unpack;
+pub mod world;
