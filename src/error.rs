@@ -126,8 +126,7 @@ impl Error {
     #[must_use]
     pub fn with_line_text(mut self, text: &str) -> Self {
         if let Self::Input(inner) = &mut self {
-            let clean: String =
-                text.chars().take(160).map(|c| if c.is_control() { ' ' } else { c }).collect();
+            let clean: String = text.chars().take(160).map(|c| if c.is_control() { ' ' } else { c }).collect();
             inner.line_text = Some(clean);
         }
         self

@@ -7,10 +7,18 @@ pub trait Real: Copy + Send + Sync + PartialOrd + std::fmt::Debug + 'static {
     fn to_f64(self) -> f64;
 }
 impl Real for f32 {
-    fn from_f64(x: f64) -> Self { x as f32 }
-    fn to_f64(self) -> f64 { f64::from(self) }
+    fn from_f64(x: f64) -> Self {
+        x as f32
+    }
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
 }
 impl Real for f64 {
-    fn from_f64(x: f64) -> Self { x }
-    fn to_f64(self) -> f64 { self }
+    fn from_f64(x: f64) -> Self {
+        x
+    }
+    fn to_f64(self) -> f64 {
+        self
+    }
 }

@@ -29,7 +29,8 @@ pub struct Rays<S> {
 impl<S: Real> Rays<S> {
     /// `len` dead rays.
     pub fn new(len: usize) -> Self {
-        let mut rays = Self { len: 0, org: Default::default(), dir: Default::default(), t_min: Vec::new(), t_max: Vec::new() };
+        let mut rays =
+            Self { len: 0, org: Default::default(), dir: Default::default(), t_min: Vec::new(), t_max: Vec::new() };
         rays.reset(len);
         rays
     }

@@ -3,5 +3,5 @@
 pub mod batch;
 pub mod counters;
 
-pub use batch::{Hits, Rays, INVALID_ID};
+pub use batch::{Hits, INVALID_ID, Rays};
 pub use counters::Counters;

@@ -18,9 +18,23 @@ pub trait Engine<S: Real>: Sync {
     fn lanes(&self) -> usize;
     /// Closest hit of each ray of `rays` into `hits` (reset to the batch's length). With `counters`, the counting
     /// build of the same kernels runs and adds to them.
-    fn intersect(&self, world: &World<S>, rays: &Rays<S>, hits: &mut Hits<S>, scratch: &mut Scratch, counters: Option<&mut Counters>);
+    fn intersect(
+        &self,
+        world: &World<S>,
+        rays: &Rays<S>,
+        hits: &mut Hits<S>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    );
     /// Whether anything lies in each ray's segment: `out` is resized to the batch's length, 1 is occluded.
-    fn occluded(&self, world: &World<S>, rays: &Rays<S>, out: &mut Vec<u8>, scratch: &mut Scratch, counters: Option<&mut Counters>);
+    fn occluded(
+        &self,
+        world: &World<S>,
+        rays: &Rays<S>,
+        out: &mut Vec<u8>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    );
 }
 
 /// A scalar type with its list of engines.
@@ -32,11 +46,15 @@ pub trait Engines: Real {
 }
 
 impl Engines for f32 {
-    fn engines() -> &'static [&'static dyn Engine<Self>] { unimplemented!() }
+    fn engines() -> &'static [&'static dyn Engine<Self>] {
+        unimplemented!()
+    }
     const PRECISION: &'static str = "f32";
 }
 impl Engines for f64 {
-    fn engines() -> &'static [&'static dyn Engine<Self>] { unimplemented!() }
+    fn engines() -> &'static [&'static dyn Engine<Self>] {
+        unimplemented!()
+    }
     const PRECISION: &'static str = "f64";
 }
 
