@@ -73,6 +73,19 @@ fn scenes_hold_what_their_table_says() {
     assert!(read >= 5, "only {read} scenes of the table were there");
 }
 
+#[test]
+fn packed_scenes_have_the_length_they_declare() {
+    for name in ["embree_trees", "san_miguel"] {
+        let Some(path) = shared(&format!("{name}/{name}.glb.zst")) else { continue };
+        assert_eq!(unpack::inner_extension(&path).as_deref(), Some("glb"));
+        let bytes = unpack::read_file(&path).unwrap();
+        // Binary glTF: magic, version, length of the file.
+        assert_eq!(&bytes[..4], b"glTF", "{name}");
+        let length = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
+        assert_eq!(length as usize, bytes.len(), "{name}");
+    }
+}
+
 /// A bumpy square grid of `side` x `side` quads as triangles; positions are f32 values.
 fn grid(side: u32) -> Mesh {
     let row = side + 1;

@@ -35,7 +35,7 @@ const MAX_TRIANGLES: usize = (u32::MAX / 3) as usize;
 /// Binary, at byte offset: a length that does not fit the count. Text, at line and column: anything that is not the
 /// word or number expected there.
 pub fn parse(file: &Path, bytes: &[u8]) -> Result<Mesh> {
-    let is_exact = declared(bytes).is_some_and(|count| HEADER + RECORD * count == bytes.len());
+    let is_exact = declared(bytes).is_some_and(|count| (bytes.len() - HEADER) as u64 == RECORD as u64 * count as u64);
     if !is_exact && is_text(bytes) { parse_text(file, bytes) } else { parse_binary(file, bytes) }
 }
 

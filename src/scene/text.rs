@@ -48,12 +48,13 @@ pub(super) fn shown(bytes: &[u8]) -> String {
     format!("`{text}`")
 }
 
-/// A name from a file: lossy UTF-8, cut to 255 bytes.
+/// A name from a file: lossy UTF-8, whole characters up to 255 bytes.
 pub(super) fn name(bytes: &[u8]) -> String {
-    let mut text = String::from_utf8_lossy(&bytes[..bytes.len().min(MAX_NAME)]).into_owned();
-    // A replacement character is longer than the byte it replaces.
-    text.truncate(text.floor_char_boundary(MAX_NAME));
-    text
+    // The longest character has four bytes: with those to spare, none that is kept is cut.
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(MAX_NAME + 4)]);
+    let ends = text.char_indices().map(|(at, c)| at + c.len_utf8());
+    let end = ends.take_while(|&end| end <= MAX_NAME).last().unwrap_or(0);
+    text[..end].to_owned()
 }
 
 /// True for bytes that end a line; a lone `\r` (old Macintosh files) does too.
@@ -217,6 +218,7 @@ mod tests {
         assert_eq!(error_at(Path::new("f"), &line, 5_000, "x").to_string(), "f:1:5001: x");
         assert!(shown(&line).len() < 60);
         assert_eq!(name(&[0xff; 300]).chars().count(), 85, "85 replacement characters are 255 bytes");
+        assert_eq!(name("é".repeat(300).as_bytes()), "é".repeat(127));
     }
 
     #[test]
