@@ -87,12 +87,14 @@ fn image_attributes(display: IntegerBounds) -> ImageAttributes {
 }
 
 fn layer_attributes(window: Window, info: &ImageInfo) -> LayerAttributes {
-    let mut attributes = LayerAttributes::default();
-    // Inside the display window, whose size was checked against EXR's limit.
-    attributes.layer_position = Vec2(window.x0 as i32, window.y0 as i32);
-    attributes.software_name = Some(text(&info.software));
-    attributes.world_to_camera = info.world_to_camera.map(imath);
-    attributes.world_to_normalized_device = info.world_to_ndc.map(imath);
+    let mut attributes = LayerAttributes {
+        // Inside the display window, whose size was checked against EXR's limit.
+        layer_position: Vec2(window.x0 as i32, window.y0 as i32),
+        software_name: Some(text(&info.software)),
+        world_to_camera: info.world_to_camera.map(imath),
+        world_to_normalized_device: info.world_to_ndc.map(imath),
+        ..LayerAttributes::default()
+    };
     let int = |x: u32| AttributeValue::I32(i32::try_from(x).unwrap_or(i32::MAX));
     for (name, value) in [
         ("revision", AttributeValue::Text(text(&info.revision))),
