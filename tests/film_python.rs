@@ -67,6 +67,8 @@ fn film() -> Film {
         film.push(name, PlaneData::F32((0..n).map(|i| k as f32 + i as f32 / 1024.0).collect())).unwrap();
     }
     film.push("id.instance", PlaneData::U32((0..n as u32).map(|i| i * 7).collect())).unwrap();
+    let long = "a name of more than the 31 characters of old EXR files";
+    film.push(long, PlaneData::F32(vec![0.5; n])).unwrap();
     film.push("id.primitive", PlaneData::U32((0..n as u32).map(|i| u32::MAX - i).collect())).unwrap();
     film
 }

@@ -8,6 +8,7 @@ import OpenEXR
 
 folder = Path(sys.argv[1])
 FLOATS = ["R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "albedo.R", "cost.nodes"]
+LONG_NAME = "a name of more than the 31 characters of old EXR files"
 HEIGHT, WIDTH = 25, 30
 
 
@@ -48,7 +49,8 @@ def check_header(header):
 
 
 def check_channels(channels):
-    assert sorted(channels) == sorted(FLOATS + ["id.instance", "id.primitive"]), sorted(channels)
+    assert sorted(channels) == sorted(FLOATS + ["id.instance", "id.primitive", LONG_NAME]), sorted(channels)
+    assert (channels[LONG_NAME].pixels == 0.5).all()
     index = np.arange(HEIGHT * WIDTH, dtype="u4").reshape(HEIGHT, WIDTH)
     for k, name in enumerate(FLOATS):
         pixels = channels[name].pixels
