@@ -1,1 +1,9 @@
-//! (being built)
+//! Measuring: ray sets, timing, statistics, checks before the clock starts, verification against the oracle, rows.
+
+pub mod answers;
+pub mod raysets;
+pub mod stats;
+pub mod timing;
+
+#[cfg(test)]
+mod testing;
