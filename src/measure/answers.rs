@@ -67,7 +67,7 @@ impl<S: Real> Answers<S> {
     /// Answers to different queries or different numbers of rays differ as a whole.
     pub fn difference(&self, other: &Self) -> Option<Difference> {
         let (count, first) = match (self, other) {
-            (Self::Closest(a), Self::Closest(b)) => differing(a, b, Hits::len, |a, b, i| same_hit(a, b, i)),
+            (Self::Closest(a), Self::Closest(b)) => differing(a, b, Hits::len, |a, b, i| same_hit(a, i, b, i)),
             (Self::Any(a), Self::Any(b)) => differing(a, b, Vec::len, |a, b, i| a[i] == b[i]),
             _ => return Some(Difference { count: 0, first: 0, text: "answers to different queries".into() }),
         }?;
@@ -75,11 +75,11 @@ impl<S: Real> Answers<S> {
         Some(Difference { count, first, text })
     }
 
-    /// Whether ray `i` of batch `b` is answered by the same bits.
-    pub fn same(&self, other: &Self, b: usize, i: usize) -> bool {
+    /// Whether ray `i` of batch `b` is answered by the same bits as ray `j` of batch `c` in `other`.
+    pub fn same_as(&self, b: usize, i: usize, other: &Self, c: usize, j: usize) -> bool {
         match (self, other) {
-            (Self::Closest(x), Self::Closest(y)) => same_hit(&x[b], &y[b], i),
-            (Self::Any(x), Self::Any(y)) => x[b][i] == y[b][i],
+            (Self::Closest(x), Self::Closest(y)) => same_hit(&x[b], i, &y[c], j),
+            (Self::Any(x), Self::Any(y)) => x[b][i] == y[c][j],
             _ => false,
         }
     }
@@ -100,10 +100,10 @@ impl<S: Real> Answers<S> {
     }
 }
 
-fn same_hit<S: Real>(a: &Hits<S>, b: &Hits<S>, i: usize) -> bool {
+fn same_hit<S: Real>(a: &Hits<S>, i: usize, b: &Hits<S>, j: usize) -> bool {
     let bits = |x: S| x.to_f64().to_bits();
-    let reals = |h: &Hits<S>| [bits(h.t[i]), bits(h.u[i]), bits(h.v[i])];
-    a.prim[i] == b.prim[i] && a.inst[i] == b.inst[i] && reals(a) == reals(b)
+    let reals = |h: &Hits<S>, i: usize| [bits(h.t[i]), bits(h.u[i]), bits(h.v[i])];
+    a.prim[i] == b.prim[j] && a.inst[i] == b.inst[j] && reals(a, i) == reals(b, j)
 }
 
 /// Number of differing rays and the first of them; batches of different lengths differ in every missing ray.
@@ -208,7 +208,7 @@ mod tests {
         assert_eq!((difference.count, difference.first), (1, 1));
         assert!(difference.text.contains("t 1.5 ") && difference.text.contains("1.5000001"), "{}", difference.text);
         assert!(one_hit::<f32>(0.0).difference(&one_hit::<f32>(-0.0)).is_some());
-        assert!(a.same(&b, 0, 0) && !a.same(&b, 0, 1));
+        assert!(a.same_as(0, 0, &b, 0, 0) && !a.same_as(0, 1, &b, 0, 1) && !a.same_as(0, 0, &a, 0, 1));
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use crate::lanes::compiled_isa;
+
 /// Git revision of the build, 12 digits, with `-dirty` if files differed from it; `unknown` outside git.
 pub const REVISION: &str = concat!(env!("LANECAST_REVISION"), env!("LANECAST_DIRTY"));
 /// The compiler: `rustc --version`.
@@ -10,27 +12,6 @@ pub const RUSTC: &str = env!("LANECAST_RUSTC");
 pub const FLAGS: &str = env!("LANECAST_FLAGS");
 /// Cargo's profile directory: `release` or `debug`.
 pub const PROFILE: &str = env!("LANECAST_PROFILE");
-
-/// The widest instruction set the build may use, as short as a table needs it.
-pub const ISA: &str = if cfg!(all(target_feature = "avx512f", target_feature = "avx512vl")) {
-    "avx512"
-} else if cfg!(all(target_feature = "avx2", target_feature = "fma")) {
-    "avx2+fma"
-} else if cfg!(target_feature = "avx2") {
-    "avx2"
-} else if cfg!(target_feature = "avx") {
-    "avx"
-} else if cfg!(target_feature = "sse4.1") {
-    "sse4.1"
-} else if cfg!(target_feature = "sse2") {
-    "sse2"
-} else if cfg!(target_feature = "neon") {
-    "neon"
-} else if cfg!(target_feature = "simd128") {
-    "simd128"
-} else {
-    "scalar"
-};
 
 /// CPU model in the vendor's words, `unknown` where nothing tells.
 pub fn cpu_model() -> String {
@@ -106,7 +87,7 @@ pub fn facts(threads: usize) -> String {
         ("rustc", RUSTC.into()),
         ("rustflags", FLAGS.into()),
         ("profile", PROFILE.into()),
-        ("isa compiled", ISA.into()),
+        ("isa compiled", compiled_isa().into()),
         ("cpu", cpu_model()),
         ("cpu family", from_cpuinfo("cpu family")),
         ("cpu model number", from_cpuinfo("model")),

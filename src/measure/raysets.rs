@@ -107,19 +107,6 @@ pub fn split<S: Real>(rays: &Rays<f32>) -> Vec<Rays<S>> {
     (0..rays.len()).step_by(BATCH).map(|at| convert_range(rays, at..rays.len().min(at + BATCH))).collect()
 }
 
-/// Batches end to end as one (for a ray file).
-pub fn join<S: Real>(batches: &[Rays<S>]) -> Rays<S> {
-    let mut all = Rays::new(batches.iter().map(Rays::len).sum());
-    let mut at = 0;
-    for batch in batches {
-        for i in 0..batch.len() {
-            all.set(at, batch.org(i), batch.dir(i), batch.t_min[i], batch.t_max[i]);
-            at += 1;
-        }
-    }
-    all
-}
-
 fn convert_range<S: Real>(from: &Rays<f32>, range: std::ops::Range<usize>) -> Rays<S> {
     let cast = |x: f32| S::from_f64(f64::from(x));
     let mut to = Rays::new(range.len());

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::lanes::compiled_isa;
 use crate::measure::env;
 use crate::measure::stats::Summary;
 
@@ -108,7 +109,8 @@ pub fn csv(run: &Run, rows: &[Row]) -> String {
 
 fn line(run: &Run, row: &Row) -> String {
     let scene = &row.scene;
-    let mut cells: Vec<String> = [env::REVISION, &run.date, &run.cpu, env::ISA, env::FLAGS].map(String::from).into();
+    let mut cells: Vec<String> =
+        [env::REVISION, &run.date, &run.cpu, compiled_isa(), env::FLAGS].map(String::from).into();
     cells.extend([run.threads.to_string(), scene.name.clone(), scene.hash.clone(), scene.prims.to_string()]);
     cells.extend([row.class, row.query, row.engine, row.precision].map(String::from));
     cells.push(row.rays.to_string());
