@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
 use crate::measure::answers::Answers;
-use crate::measure::eye::View;
+use crate::measure::eye::{Framing, View};
 use crate::measure::raysets::{RayKind, convert};
 use crate::measure::rows::{Outcome, Row, SceneFacts};
 use crate::measure::stats::{paired_ratio_median, summary};
@@ -12,7 +12,7 @@ use crate::measure::timing::{Series, Workers, interleave};
 use crate::measure::truth;
 use crate::ray::Rays;
 use crate::reference::Oracle;
-use crate::scene::description::{CameraDescription, Description, Precision};
+use crate::scene::description::{Description, Precision};
 use crate::scene::world::{Preset, World};
 use crate::trace::{Engine, Engines, engine};
 
@@ -56,7 +56,7 @@ pub struct Plan {
 pub fn scene<S: Engines>(
     workers: &Workers,
     description: &Description,
-    camera: &CameraDescription,
+    camera: Framing<'_>,
     plan: &Plan,
     stop: &dyn Fn() -> bool,
     report: &mut dyn FnMut(Row),
@@ -89,7 +89,7 @@ fn chosen<S: Engines>(names: &[String]) -> Result<Vec<&'static dyn Engine<S>>> {
     if names.is_empty() { Ok(S::engines().to_vec()) } else { names.iter().map(|name| engine(name)).collect() }
 }
 
-struct Subject<'a, S> {
+struct Subject<'a, S: 'static> {
     workers: &'a Workers,
     world: &'a World<S>,
     oracle: &'a Oracle,

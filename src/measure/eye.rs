@@ -10,6 +10,9 @@ use crate::scene::description::{CameraDescription, Description};
 use crate::scene::world::World;
 use crate::trace::{Engine, Engines, Scratch, engine};
 
+/// Picks the camera once the bounds of the scene (lower and upper corner, `None` if nothing is bounded) are known.
+pub type Framing<'a> = &'a (dyn Fn(Option<(DVec3, DVec3)>) -> Result<CameraDescription> + Sync);
+
 /// A scene seen by a camera: primary rays, where they hit, and what secondary rays need to know.
 pub struct View {
     /// Primary rays in ray-file order, one batch per tile.
@@ -25,19 +28,21 @@ impl View {
     /// primary rays are traced by the `scalar` engine on the current rayon pool.
     ///
     /// # Errors
-    /// A camera that cannot see (eye and target coincide, no field of view).
+    /// Those of `camera`, and a camera that cannot see (eye and target coincide, no field of view).
     pub fn new<S: Engines>(
         world: &World<S>,
         description: &Description,
-        camera: &CameraDescription,
+        camera: Framing<'_>,
         size: (u32, u32),
         seed: u64,
     ) -> Result<Self> {
-        let primary = primary_rays(camera, size)?;
+        let bounds = world.bounds();
+        let camera = camera(bounds)?;
+        let primary = primary_rays(&camera, size)?;
         let scalar = engine::<S>("scalar")?;
         let starts = Starts::trace(world, scalar, &primary);
         // A scene of nothing but half-spaces has no diagonal; its lengths are then taken as unit length.
-        let diagonal = world.bounds().map_or(1.0, |(lo, hi)| (hi - lo).length());
+        let diagonal = bounds.map_or(1.0, |(lo, hi)| (hi - lo).length());
         let up = camera.up.normalize_or_zero();
         let clearance = clearance(world, scalar, camera.eye, up);
         let light = light_for(&description.lights, camera.eye, up, diagonal, clearance);

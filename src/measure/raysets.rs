@@ -35,6 +35,17 @@ pub enum Query {
     Any,
 }
 
+impl std::str::FromStr for Query {
+    type Err = Error;
+
+    fn from_str(word: &str) -> Result<Self> {
+        [Self::Closest, Self::Any]
+            .into_iter()
+            .find(|query| query.name() == word)
+            .ok_or_else(|| Error::Usage(format!("unknown query `{word}`; the queries are closest and any")))
+    }
+}
+
 impl Query {
     /// Name on the command line and in tables.
     pub fn name(self) -> &'static str {

@@ -7,10 +7,14 @@ use crate::measure::env;
 use crate::measure::stats::Summary;
 
 /// What is common to all rows of a run.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize)]
 pub struct Run {
     /// UTC date and time.
     pub date: String,
+    /// Revision of the build, see [`env::REVISION`].
+    pub revision: &'static str,
+    /// Instruction set of the build.
+    pub isa: &'static str,
     /// CPU model.
     pub cpu: String,
     /// Threads that traced.
@@ -22,12 +26,19 @@ pub struct Run {
 impl Run {
     /// A run that starts now, with the process's own command line.
     pub fn now(threads: usize) -> Self {
-        Self { date: env::now(), cpu: env::cpu_model(), threads, command: env::command_line() }
+        Self {
+            date: env::now(),
+            revision: env::REVISION,
+            isa: compiled_isa(),
+            cpu: env::cpu_model(),
+            threads,
+            command: env::command_line(),
+        }
     }
 }
 
 /// The scene a row is about.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize)]
 pub struct SceneFacts {
     /// Name as in the description.
     pub name: String,
@@ -42,7 +53,8 @@ pub struct SceneFacts {
 }
 
 /// What was measured, or why not.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// Checked and timed.
     Timed {
@@ -68,7 +80,7 @@ pub enum Outcome {
 }
 
 /// One row.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize)]
 pub struct Row {
     /// The scene.
     pub scene: SceneFacts,
@@ -109,8 +121,7 @@ pub fn csv(run: &Run, rows: &[Row]) -> String {
 
 fn line(run: &Run, row: &Row) -> String {
     let scene = &row.scene;
-    let mut cells: Vec<String> =
-        [env::REVISION, &run.date, &run.cpu, compiled_isa(), env::FLAGS].map(String::from).into();
+    let mut cells: Vec<String> = [run.revision, &run.date, &run.cpu, run.isa, env::FLAGS].map(String::from).into();
     cells.extend([run.threads.to_string(), scene.name.clone(), scene.hash.clone(), scene.prims.to_string()]);
     cells.extend([row.class, row.query, row.engine, row.precision].map(String::from));
     cells.push(row.rays.to_string());
@@ -222,7 +233,8 @@ mod tests {
     }
 
     fn run() -> Run {
-        Run { date: "2026-01-31T00:00:00Z".into(), cpu: "CPU".into(), threads: 2, command: "lanecast bench".into() }
+        let (date, cpu, command) = ["2026-01-31T00:00:00Z", "CPU", "lanecast bench"].map(String::from).into();
+        Run { date, revision: "0123456789ab", isa: "avx2", cpu, threads: 2, command }
     }
 
     /// Reads a CSV line by the rules of RFC 4180.

@@ -48,7 +48,7 @@ pub fn paired_ratio_median(numerator: &[f64], denominator: &[f64]) -> Option<f64
 }
 
 /// What a table says about one list of timings.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Summary {
     /// Smallest sample: for seconds, the best pass.
     pub min: f64,

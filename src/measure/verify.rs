@@ -2,13 +2,13 @@
 
 use crate::error::{Error, Result};
 use crate::measure::answers::Answers;
-use crate::measure::eye::View;
+use crate::measure::eye::{Framing, View};
 use crate::measure::raysets::{Query, RayKind, convert};
 use crate::measure::timing::Workers;
 use crate::measure::truth::{self, Counts};
 use crate::ray::Rays;
 use crate::reference::Oracle;
-use crate::scene::description::{CameraDescription, Description, Precision};
+use crate::scene::description::{Description, Precision};
 use crate::scene::world::{Preset, World};
 use crate::trace::{Engine, Engines, engine};
 
@@ -82,7 +82,7 @@ pub fn picture_of(rays: u64) -> (u32, u32) {
 pub fn verify<S: Engines>(
     workers: &Workers,
     description: &Description,
-    camera: &CameraDescription,
+    camera: Framing<'_>,
     options: &Options,
     stop: &dyn Fn() -> bool,
     report: &mut dyn FnMut(Line),
