@@ -17,7 +17,7 @@ use crate::scene::description::{Description, Precision};
 use crate::trace::Engines;
 
 /// Scenes of a bench that is not told one.
-const DEFAULT_SCENES: [&str; 2] = ["builtin:sphere-flake", "builtin:cornell-box"];
+const DEFAULT_SCENES: [&str; 2] = ["builtin:sphere-flake", "builtin:cornell"];
 
 /// Picture of a bench unless `--size` says otherwise.
 const DEFAULT_SIZE: (u32, u32) = (320, 192);
@@ -59,8 +59,8 @@ pub struct BenchArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder for bench.csv (one row per figure) and bench.env.txt (machine and build)
-    #[arg(short, long, value_name = "DIR")]
-    output_dir: Option<PathBuf>,
+    #[arg(short, long = "output", value_name = "DIR")]
+    folder: Option<PathBuf>,
     #[command(flatten)]
     pub(super) output: OutputArgs,
 }
@@ -87,7 +87,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     } else if !rows.is_empty() {
         to_stdout(&format!("{}{LEGEND}", rows::table(&rows)))?;
     }
-    if let (Some(dir), false) = (&args.output_dir, rows.is_empty()) {
+    if let (Some(dir), false) = (&args.folder, rows.is_empty()) {
         write(dir, &run, &rows, &facts)?;
     }
     finished?;

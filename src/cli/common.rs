@@ -2,9 +2,10 @@
 
 use glam::DVec3;
 
+use crate::camera::{CameraOverrides, framing};
 use crate::error::{Error, Result, nearest_name};
 use crate::measure::timing::MAX_THREADS;
-use crate::scene::description::{CameraDescription, Description, Precision, Projection};
+use crate::scene::description::{CameraDescription, Description, Precision};
 use crate::scene::load::{LoadOptions, load};
 use crate::scene::world::Preset;
 
@@ -137,45 +138,20 @@ impl CameraArgs {
     /// corner) in a picture of `size`; then `--eye`, `--look-at`, `--up` and `--fov` change it.
     ///
     /// # Errors
-    /// A usage error for an unknown name, or if there is neither a camera nor anything to frame.
+    /// A usage error for an unknown name.
     pub fn choose(
         &self,
         description: &Description,
         bounds: Option<(DVec3, DVec3)>,
         size: (u32, u32),
     ) -> Result<CameraDescription> {
-        let mut camera = match &self.camera {
-            Some(name) => named(description, name)?,
-            None => match (description.cameras.first(), bounds) {
-                (Some(first), _) => first.clone(),
-                (None, Some((lo, hi))) => crate::camera::framing(lo, hi, f64::from(size.0) / f64::from(size.1)),
-                (None, None) => self.free_camera()?,
-            },
+        let camera = match (&self.camera, description.cameras.first()) {
+            (Some(name), _) => named(description, name)?,
+            (None, Some(first)) => first.clone(),
+            (None, None) => framing(bounds, f64::from(size.0) / f64::from(size.1)),
         };
-        if let Some(eye) = self.eye {
-            camera.eye = eye;
-        }
-        if let Some(look_at) = self.look_at {
-            camera.look_at = look_at;
-        }
-        if let Some(up) = self.up {
-            camera.up = up;
-        }
-        if let Some(degrees) = self.fov {
-            camera.projection = Projection::Perspective { theta: degrees.to_radians() };
-        }
-        Ok(camera)
-    }
-
-    /// For a scene that nothing bounds: `--eye` and `--look-at` must say it.
-    fn free_camera(&self) -> Result<CameraDescription> {
-        let (Some(eye), Some(look_at)) = (self.eye, self.look_at) else {
-            return Err(Error::Usage(
-                "the scene has no camera and no bounds to frame: give --eye and --look-at".into(),
-            ));
-        };
-        let projection = Projection::Perspective { theta: 45f64.to_radians() };
-        Ok(CameraDescription { name: String::new(), eye, look_at, up: DVec3::Y, projection })
+        let theta = self.fov.map(f64::to_radians);
+        Ok(CameraOverrides { eye: self.eye, look_at: self.look_at, up: self.up, theta }.apply(&camera))
     }
 }
 
@@ -235,6 +211,7 @@ pub fn with_pool<R: Send>(threads: usize, work: impl FnOnce() -> Result<R> + Sen
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::description::Projection;
 
     #[test]
     fn arguments_parse_or_say_what_is_expected() {
@@ -276,12 +253,10 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_without_bounds_needs_an_eye() {
-        let scene = Description::new("s");
-        let mut args = CameraArgs::default();
-        assert_eq!(args.choose(&scene, None, (1, 1)).unwrap_err().exit_code(), 2);
-        (args.eye, args.look_at) = (Some(DVec3::Z), Some(DVec3::ZERO));
-        assert_eq!(args.choose(&scene, None, (1, 1)).unwrap().eye, DVec3::Z);
+    fn a_scene_without_cameras_is_framed() {
+        let bounds = Some((DVec3::splat(9.0), DVec3::splat(11.0)));
+        let camera = CameraArgs::default().choose(&Description::new("s"), bounds, (4, 3)).unwrap();
+        assert_eq!(camera.look_at, DVec3::splat(10.0));
     }
 
     #[test]

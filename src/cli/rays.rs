@@ -45,8 +45,8 @@ pub struct RaysArgs {
     #[command(flatten)]
     threads: ThreadArgs,
     /// File to write: NumPy f4 of shape (N, 8)
-    #[arg(short, long, value_name = "FILE.npy")]
-    output_file: PathBuf,
+    #[arg(short, long = "output", value_name = "FILE.npy")]
+    file: PathBuf,
     #[command(flatten)]
     pub(super) output: OutputArgs,
 }
@@ -76,9 +76,9 @@ pub fn run(args: &RaysArgs) -> Result<()> {
     if stopped() {
         return Err(Error::Interrupted);
     }
-    let count = npy::write_rays(&args.output_file, &rays)?;
+    let count = npy::write_rays(&args.file, &rays)?;
     let live = rays.iter().map(|batch| batch.live_count() as u64).sum();
-    let (kind, file) = (args.kind.name(), args.output_file.display().to_string());
+    let (kind, file) = (args.kind.name(), args.file.display().to_string());
     if args.output.json {
         return json_to_stdout(&Report {
             scene: &args.scene.scene,

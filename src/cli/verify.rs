@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::common::{CameraArgs, OutputArgs, SceneArgs, ThreadArgs};
+use super::common::{CameraArgs, OutputArgs, PrecisionArg, SceneArgs, ThreadArgs};
 use super::interrupt::stopped;
 use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
@@ -28,7 +28,7 @@ or any bit differs.";
 pub struct VerifyArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Rays per class, about [default: as many as take seconds]
+    /// Rays per class, about, if there is no --size [default: as many as take seconds]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     rays: Option<u64>,
     /// Ray classes
@@ -60,10 +60,9 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
     let description = args.scene.load()?;
     let workers = Workers::new(args.threads.count())?;
     let mut lines = Vec::new();
-    let asked = args.scene.options.precision.map(|_| args.scene.options.precision(&description));
-    let finished = match asked {
-        Some(crate::scene::description::Precision::F32) => one::<f32>(args, &workers, &description, &mut lines),
-        Some(crate::scene::description::Precision::F64) => one::<f64>(args, &workers, &description, &mut lines),
+    let finished = match args.scene.options.precision {
+        Some(PrecisionArg::F32) => one::<f32>(args, &workers, &description, &mut lines),
+        Some(PrecisionArg::F64) => one::<f64>(args, &workers, &description, &mut lines),
         None => one::<f32>(args, &workers, &description, &mut lines)
             .and_then(|()| one::<f64>(args, &workers, &description, &mut lines)),
     };

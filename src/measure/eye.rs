@@ -1,7 +1,9 @@
 //! From a camera to primary rays and to the place of the default light: where this floor touches `camera`.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
+use crate::camera::{Camera, FILE_TILE, PixelRect, SubPixel, Tiling, fill_tile};
 use crate::error::Result;
 use crate::lanes::Real;
 use crate::measure::raysets::{Setting, Starts, light_for};
@@ -50,9 +52,17 @@ impl View {
     }
 }
 
-/// The rays of `camera` through the pixels of a `size` picture, in ray-file order.
-fn primary_rays(camera: &CameraDescription, size: (u32, u32)) -> Result<Vec<Rays<f32>>> {
-    crate::camera::ray_file_batches(camera, size)
+/// The rays of `camera` through the pixel centres of a `size` picture, in ray-file order.
+fn primary_rays(camera: &CameraDescription, (width, height): (u32, u32)) -> Result<Vec<Rays<f32>>> {
+    let tiling = Tiling::new(width, height, FILE_TILE)?;
+    let camera = Camera::new(camera, f64::from(width) / f64::from(height))?;
+    let whole = PixelRect { x0: 0, y0: 0, x1: width, y1: height };
+    let tile = |tile| {
+        let mut rays = Rays::new(0);
+        fill_tile(&camera, &tiling, tile, whole, SubPixel::Centre, &mut rays);
+        rays
+    };
+    Ok((0..tiling.tiles()).into_par_iter().map(tile).collect())
 }
 
 /// Distance from `org` along unit `dir` to the first surface; infinite if there is none.

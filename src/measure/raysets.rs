@@ -10,6 +10,7 @@ use std::sync::Mutex;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::camera::sampling::{PixelRandom, cosine_hemisphere};
 use crate::error::{Error, Result};
 use crate::lanes::Real;
 use crate::ray::{Hits, Rays};
@@ -25,6 +26,9 @@ pub const AO_REACH: f64 = 0.05;
 
 /// How far above the eye the default light of shadow rays sits, relative to the diagonal of the scene's bounds.
 pub const LIGHT_RISE: f64 = 0.05;
+
+/// Random dimensions of the ray classes start here, apart from those of cameras and integrators.
+const DIMENSION: u32 = 0x100;
 
 /// What is asked of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,7 +177,7 @@ impl Starts {
             let mut rays = Rays::new(starts.len());
             for (i, start) in starts.iter().enumerate() {
                 let Some(start) = start else { continue };
-                let random = random_pair(setting.seed, kind, (b * BATCH + i) as u64);
+                let random = PixelRandom::new(i as u32, b as u32, setting.seed).pair(0, DIMENSION + kind as u32);
                 if let Some((org, dir, t_max)) = secondary(kind, start, setting, random) {
                     rays.set(i, org, dir, 0.0, t_max);
                 }
@@ -225,7 +229,7 @@ fn secondary(kind: RayKind, at: &Start, setting: &Setting, random: [f64; 2]) -> 
     if !at.position.as_vec3().is_finite() {
         return None;
     }
-    let cosine = || cosine_direction(at.normal, random);
+    let cosine = || cosine_hemisphere(at.normal, random);
     let (dir, t_max) = match kind {
         RayKind::Primary => return None,
         RayKind::Shadow => {
@@ -270,37 +274,6 @@ pub fn offset_origin(position: DVec3, normal: DVec3) -> [f32; 3] {
         let ulps = (ULPS * n) as i32;
         let outward = if p < 0.0 { -ulps } else { ulps };
         f32::from_bits(p.to_bits().wrapping_add_signed(outward))
-    })
-}
-
-/// Unit direction, cosine distributed around unit `normal`, from two numbers in [0, 1).
-///
-/// The disc is sampled by radius and angle and lifted to the hemisphere (T. Malley's method; M. Pharr, W. Jakob,
-/// G. Humphreys, "Physically Based Rendering", 4th ed., 2023, section A.5.3). The tangents are T. Duff et al.,
-/// "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017.
-pub fn cosine_direction(normal: DVec3, random: [f64; 2]) -> DVec3 {
-    let radius = random[0].sqrt();
-    let (sin, cos) = (std::f64::consts::TAU * random[1]).sin_cos();
-    let height = (1.0 - random[0]).max(0.0).sqrt();
-    let (tangent, bitangent) = normal.any_orthonormal_pair();
-    (tangent * (radius * cos) + bitangent * (radius * sin) + normal * height).normalize()
-}
-
-/// Two numbers in [0, 1) that depend only on seed, class and slot, so not on the number of threads.
-///
-/// The mixing function is the finaliser of SplitMix64 (G. Steele, D. Lea, C. Flood, "Fast Splittable Pseudorandom
-/// Number Generators", OOPSLA 2014).
-fn random_pair(seed: u64, kind: RayKind, slot: u64) -> [f64; 2] {
-    const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-    let mix = |mut x: u64| {
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
-    };
-    let stream = mix(seed.wrapping_add(GOLDEN.wrapping_mul(kind as u64 + 1)));
-    [0, 1].map(|i| {
-        let bits = mix(stream.wrapping_add(GOLDEN.wrapping_mul(2 * slot + i + 1)));
-        (bits >> 11) as f64 / (1u64 << 53) as f64
     })
 }
 

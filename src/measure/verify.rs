@@ -19,8 +19,10 @@ pub const BRUTE_LIMIT: u64 = 400_000_000;
 /// What to verify.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Rays per class; `None` picks a number that takes seconds.
+    /// Rays per class, about; `None` picks a number that takes seconds.
     pub rays: Option<u64>,
+    /// Width and height of the picture whose rays are traced; `None` follows from `rays`.
+    pub size: Option<(u32, u32)>,
     /// Ray classes.
     pub kinds: Vec<RayKind>,
     /// Seed of the random directions.
@@ -89,7 +91,7 @@ pub fn verify<S: Engines>(
 ) -> Result<()> {
     let world = workers.install(|| World::<S>::compile(description, options.preset))?;
     let rays = options.rays.unwrap_or_else(|| default_rays(world.assembly.instanced_prims()));
-    let size = picture_of(rays);
+    let size = options.size.unwrap_or_else(|| picture_of(rays));
     let view = workers.install(|| View::new(&world, description, camera, size, options.seed))?;
     let oracle = Oracle::new(&world.assembly);
     let bench = Bench { workers, world: &world, oracle: &oracle };

@@ -65,35 +65,41 @@ fn occlusion_rays_are_a_twentieth_of_the_diagonal_long() {
     assert!((dir.iter().map(|d| d * d).sum::<f32>() - 1.0).abs() < 1e-6);
 }
 
-/// For a cosine density cos(theta)/pi, the mean of cos(theta) is 2/3 and of its square 1/2; tangents average to 0.
+/// Starts on a floor, all seen from above.
+fn floor(batches: usize) -> Starts {
+    let one = at([1.0, 0.0, 2.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]);
+    Starts { batches: vec![vec![Some(one); BATCH]; batches] }
+}
+
+/// For a cosine density cos(theta)/pi, the mean of cos(theta) is 2/3 and of its square 1/2.
 #[test]
-fn cosine_directions_have_the_moments_of_a_cosine() {
-    let normal = DVec3::new(1.0, -2.0, 0.5).normalize();
-    let count = 20_000;
-    let (mut first, mut second, mut sum) = (0.0, 0.0, DVec3::ZERO);
-    for slot in 0..count {
-        let dir = cosine_direction(normal, random_pair(7, RayKind::Diffuse, slot));
-        assert!((dir.length() - 1.0).abs() < 1e-12);
-        let cosine = dir.dot(normal);
-        assert!(cosine >= 0.0);
-        first += cosine;
-        second += cosine * cosine;
-        sum += dir - normal * cosine;
-    }
-    let count = count as f64;
-    assert!((first / count - 2.0 / 3.0).abs() < 0.01, "{}", first / count);
-    assert!((second / count - 0.5).abs() < 0.01, "{}", second / count);
-    assert!(sum.length() / count < 0.01, "{sum}");
+fn diffuse_rays_have_the_moments_of_a_cosine() {
+    let batches = floor(8).rays(RayKind::Diffuse, &setting());
+    let cosines: Vec<f64> = batches.iter().flat_map(|b| &b.dir[1][..b.len()]).map(|&c| f64::from(c)).collect();
+    let mean = |power| cosines.iter().map(|c| c.powi(power)).sum::<f64>() / cosines.len() as f64;
+    assert!((mean(1) - 2.0 / 3.0).abs() < 0.01, "{}", mean(1));
+    assert!((mean(2) - 0.5).abs() < 0.01, "{}", mean(2));
 }
 
 #[test]
-fn random_numbers_depend_on_seed_class_and_slot() {
-    let one = random_pair(1, RayKind::Ao, 5);
-    assert_eq!(one, random_pair(1, RayKind::Ao, 5));
-    for other in [random_pair(2, RayKind::Ao, 5), random_pair(1, RayKind::Diffuse, 5), random_pair(1, RayKind::Ao, 6)] {
-        assert_ne!(one, other);
+fn random_directions_depend_on_seed_class_and_slot() {
+    let rays = |kind, seed| floor(2).rays(kind, &Setting { seed, ..setting() });
+    let one = rays(RayKind::Ao, 1);
+    assert_eq!(one[1].dir(5), rays(RayKind::Ao, 1)[1].dir(5));
+    for other in [rays(RayKind::Ao, 2)[1].dir(5), rays(RayKind::Diffuse, 1)[1].dir(5), one[0].dir(5), one[1].dir(6)] {
+        assert_ne!(one[1].dir(5), other);
     }
-    assert!(one.iter().all(|x| (0.0..1.0).contains(x)));
+}
+
+#[test]
+fn a_miss_makes_a_dead_ray() {
+    let mut starts = floor(1);
+    starts.batches[0][3] = None;
+    assert_eq!(starts.count(), BATCH - 1);
+    for kind in [RayKind::Shadow, RayKind::Ao, RayKind::Reflect, RayKind::Diffuse] {
+        let rays = &starts.rays(kind, &setting())[0];
+        assert_eq!((rays.len(), rays.live_count(), rays.is_live(3)), (BATCH, BATCH - 1, false), "{}", kind.name());
+    }
 }
 
 /// 256 ulps of 1000 (ulp 2^-14) are 1/64; near 0 the step is 1/65536.
