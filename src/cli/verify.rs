@@ -89,7 +89,7 @@ fn one<S: Engines>(
     lines: &mut Vec<Line>,
 ) -> Result<()> {
     let options =
-        Options { rays: args.rays, kinds: args.kinds.clone(), seed: args.seed, preset: args.scene.options.preset() };
+        Options { rays: args.rays, size: args.camera.size, kinds: args.kinds.clone(), seed: args.seed, preset: args.scene.options.preset() };
     let size = args.camera.size.unwrap_or((4, 3));
     let camera = |bounds| args.camera.choose(description, bounds, size);
     let bar = args.output.progress_bar((2 * args.kinds.len() * S::engines().len()) as u64, "verifying");
