@@ -1,8 +1,8 @@
 //! `verify`, `bench` and `info` through the real binary.
 
-mod common;
+mod binary;
 
-use common::{SQUARE, files, lanecast};
+use binary::{SQUARE, files, lanecast};
 
 fn square() -> tempfile::TempDir {
     let dir = tempfile::tempdir().expect("a temporary folder");
@@ -10,7 +10,7 @@ fn square() -> tempfile::TempDir {
     dir
 }
 
-fn run(dir: &tempfile::TempDir, line: &str) -> common::Ended {
+fn run(dir: &tempfile::TempDir, line: &str) -> binary::Ended {
     let ended = lanecast(dir.path(), &line.split(' ').collect::<Vec<_>>());
     assert_eq!(ended.code, Some(0), "{line}: {}{}", ended.out, ended.err);
     ended

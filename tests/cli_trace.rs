@@ -1,10 +1,10 @@
 //! `rays` and `trace` through the real binary, on a square whose hits are known in closed form.
 
-mod common;
+mod binary;
 
 use std::path::Path;
 
-use common::{SQUARE, files, lanecast, npy_parts, ray_file, refused};
+use binary::{SQUARE, files, lanecast, npy_parts, ray_file, refused};
 
 const INFINITY: f32 = f32::INFINITY;
 
@@ -25,7 +25,7 @@ fn square() -> tempfile::TempDir {
     dir
 }
 
-fn trace(dir: &Path, more: &str) -> common::Ended {
+fn trace(dir: &Path, more: &str) -> binary::Ended {
     let line = format!("trace square.ply --rays rays.npy {more}");
     lanecast(dir, &line.split_whitespace().collect::<Vec<_>>())
 }

@@ -1,8 +1,8 @@
 //! Help, versions, exit codes and refusals of the binary.
 
-mod common;
+mod binary;
 
-use common::{lanecast, refused};
+use binary::{lanecast, refused};
 
 const COMMANDS: [&str; 5] = ["bench", "trace", "rays", "verify", "info"];
 
@@ -54,7 +54,7 @@ fn bad_usage_exits_with_2() {
     refused(path, &["rays", "builtin:cornell", "--kind", "ao", "--fov", "180", "-o", "r.npy"], "degrees");
     refused(path, &["bench", "builtin:cornell", "--engines", "scaler"], "scalar");
     refused(path, &["bench", "--threads", "0"], "threads");
-    assert_eq!(common::files(path), Vec::<String>::new(), "refusals leave no files");
+    assert_eq!(binary::files(path), Vec::<String>::new(), "refusals leave no files");
 }
 
 /// `--eye -1,0,0` is a point, not an option.
@@ -65,7 +65,7 @@ fn negative_coordinates_are_values() {
     let ended = lanecast(dir.path(), &arguments.split(' ').collect::<Vec<_>>());
     assert_eq!(ended.code, Some(0), "{}", ended.err);
     let bytes = std::fs::read(dir.path().join("rays.npy")).expect("a ray file");
-    let (header, data) = common::npy_parts(&bytes);
+    let (header, data) = binary::npy_parts(&bytes);
     assert!(header.contains("(1024, 8)"), "{header}");
     assert_eq!(&data[..12], [-9f32, 1.0, 8.0].map(f32::to_le_bytes).concat());
 }

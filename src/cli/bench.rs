@@ -59,7 +59,7 @@ pub struct BenchArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder for bench.csv (one row per figure) and bench.env.txt (machine and build)
-    #[arg(short, long = "output", value_name = "DIR")]
+    #[arg(short = 'o', long = "output", value_name = "DIR")]
     folder: Option<PathBuf>,
     #[command(flatten)]
     pub(super) output: OutputArgs,

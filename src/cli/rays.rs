@@ -45,7 +45,7 @@ pub struct RaysArgs {
     #[command(flatten)]
     threads: ThreadArgs,
     /// File to write: NumPy f4 of shape (N, 8)
-    #[arg(short, long = "output", value_name = "FILE.npy")]
+    #[arg(short = 'o', long = "output", value_name = "FILE.npy")]
     file: PathBuf,
     #[command(flatten)]
     pub(super) output: OutputArgs,

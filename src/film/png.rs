@@ -12,8 +12,11 @@ use super::planes::{ALPHA, COLOR, Film, PlaneData};
 use super::{input, srgb, write_atomically};
 use crate::error::{Error, Result};
 
-/// Deflate grows data at most 1032 times; a header that claims more than this many bytes per byte of file lies.
-const MAX_GROWTH: u64 = 1100;
+/// Most bytes of planes per byte of file. Deflate grows data at most 1032 times and a grey byte becomes three floats, 12
+/// bytes; a header that claims more lies (or is a huge blank picture of fewer bits, refused with the liars).
+const MAX_GROWTH: u64 = 1032 * 12 * 4 / 3;
+/// Every tiny picture is fine.
+const ALWAYS_ALLOWED: u64 = 1 << 16;
 
 /// Interleaved 8-bit sRGB pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -90,11 +93,10 @@ pub fn parse(file: &Path, bytes: &[u8]) -> Result<Film> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(bad)?;
-    let info = reader.info();
-    let (width, height) = (info.width, info.height);
-    let bits = (info.color_type.samples() * info.bit_depth as usize) as u64;
-    let claimed = (u64::from(width) * u64::from(height)).saturating_mul(bits) / 8;
-    if claimed > MAX_GROWTH.saturating_mul(bytes.len() as u64) {
+    let (width, height) = (reader.info().width, reader.info().height);
+    let planes = if has_alpha(reader.output_color_type().0) { 4 } else { 3 };
+    let claimed = (u64::from(width) * u64::from(height)).saturating_mul(4 * planes);
+    if claimed > MAX_GROWTH.saturating_mul(bytes.len() as u64).saturating_add(ALWAYS_ALLOWED) {
         let what = format!("claims {width}x{height} pixels, more than {} bytes of file can hold", bytes.len());
         return Err(Error::whole(file, what));
     }
@@ -105,13 +107,17 @@ pub fn parse(file: &Path, bytes: &[u8]) -> Result<Film> {
     film_of(width, height, frame.color_type, frame.bit_depth, &pixels).map_err(|e| Error::whole(file, e.to_string()))
 }
 
+fn has_alpha(color: ColorType) -> bool {
+    matches!(color, ColorType::Rgba | ColorType::GrayscaleAlpha)
+}
+
 fn film_of(width: u32, height: u32, color: ColorType, depth: BitDepth, pixels: &[u8]) -> Result<Film> {
     let samples = color.samples();
     let unit: Box<dyn Fn(usize) -> f64> = match depth {
         BitDepth::Sixteen => Box::new(|i| f64::from(u16::from_be_bytes([pixels[2 * i], pixels[2 * i + 1]])) / 65535.0),
         _ => Box::new(|i| f64::from(pixels[i]) / 255.0),
     };
-    let has_alpha = matches!(color, ColorType::Rgba | ColorType::GrayscaleAlpha);
+    let has_alpha = has_alpha(color);
     let is_gray = matches!(color, ColorType::Grayscale | ColorType::GrayscaleAlpha);
     let mut film = Film::full(width, height)?;
     let count = film.pixels();
@@ -133,6 +139,7 @@ mod tests {
 
     use super::*;
     use crate::film::Window;
+    use crate::film::tests::{XorShift, mutate};
 
     fn film(width: u32, height: u32, planes: &[(&str, Vec<f32>)]) -> Film {
         let mut film = Film::full(width, height).unwrap();
@@ -213,7 +220,7 @@ mod tests {
         assert_eq!((back.width, back.height), (3, 1));
     }
 
-    /// A PNG of one chunk of each kind, checksums right, from another encoder's point of view: built by hand.
+    /// A PNG put together by hand from its chunks: checksums by flate2, no filter, `raw` rows with their filter bytes.
     fn png_bytes(width: u32, height: u32, depth: u8, color: u8, extra: &[(&[u8; 4], &[u8])], raw: &[u8]) -> Vec<u8> {
         let mut header = [width.to_be_bytes(), height.to_be_bytes()].concat();
         header.extend([depth, color, 0, 0, 0]);
@@ -257,5 +264,32 @@ mod tests {
         let mut film = Film::full(1, 1).unwrap();
         film.push("R", PlaneData::F32(vec![0.0])).unwrap();
         assert!(to_srgb8(&film, 0.0).is_err());
+    }
+
+    #[test]
+    fn a_blank_picture_is_no_liar() {
+        for (depth, color, row) in [(8, 0, 1025), (8, 2, 3073), (16, 6, 8193)] {
+            let blank = png_bytes(1024, 1024, depth, color, &[], &vec![0; 1024 * row]);
+            assert_eq!(parse(Path::new("b"), &blank).unwrap().f32_plane("G").unwrap(), vec![0.0; 1 << 20]);
+        }
+    }
+
+    #[test]
+    fn mutated_files_never_panic() {
+        let palette: [(&[u8; 4], &[u8]); 2] = [(b"PLTE", &[0, 255, 0, 255, 0, 0]), (b"tRNS", &[0, 128])];
+        let seeds = [
+            png_bytes(2, 2, 16, 0, &[], &[0, 0xff, 0xff, 0x80, 0, 4, 1, 2, 3, 4]),
+            png_bytes(3, 1, 1, 3, &palette, &[0, 0b0100_0000]),
+            png_bytes(2, 1, 8, 6, &[], &[1, 1, 2, 3, 4, 5, 6, 7, 8]),
+        ];
+        let (mut random, mut accepted) = (XorShift(0xd1b5_4a32_d192_ed03), 0);
+        for round in 0..20_000 {
+            let bytes = mutate(&seeds[round % seeds.len()], &mut random);
+            if let Ok(film) = parse(Path::new("m"), &bytes) {
+                film.validate().unwrap();
+                accepted += 1;
+            }
+        }
+        assert!((100..19_900).contains(&accepted), "{accepted}");
     }
 }

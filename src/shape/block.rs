@@ -33,6 +33,17 @@ impl<S: Real, const F: usize> Block<S, F> {
         self.prim[i] = prim;
     }
 
+    /// Primitives in the block: slots `0..len`.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.prim.iter().take_while(|&&p| p != INVALID_ID).count()
+    }
+
+    /// Whether no slot is used.
+    pub fn is_empty(&self) -> bool {
+        self.prim[0] == INVALID_ID
+    }
+
     /// The numbers of the primitive in slot `i`.
     #[inline(always)]
     pub fn get(&self, i: usize) -> [S; F] {

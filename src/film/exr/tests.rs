@@ -53,6 +53,17 @@ fn planes_windows_and_special_values_survive() {
 }
 
 #[test]
+fn long_names_are_announced() {
+    for (len, version) in [(31, [2, 0, 0, 0]), (32, [2, 4, 0, 0]), (255, [2, 4, 0, 0])] {
+        let mut film = Film::full(1, 1).unwrap();
+        film.push("n".repeat(len), PlaneData::F32(vec![0.5])).unwrap();
+        let bytes = encode(&film, Compression::Zip);
+        assert_eq!(bytes[4..8], version, "{len}");
+        assert_eq!(parse_bytes(&bytes).unwrap(), film);
+    }
+}
+
+#[test]
 fn films_that_cannot_be_written_leave_no_file() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.exr");

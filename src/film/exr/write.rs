@@ -1,6 +1,6 @@
 //! Writing EXR files.
 
-use std::io;
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use exr::block::lines::LineRefMut;
@@ -13,6 +13,13 @@ use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, Image, Layer, Vec2
 use super::ImageInfo;
 use crate::error::{Error, Result};
 use crate::film::{Film, PlaneData, Window, write_atomically};
+
+/// Older programs accept longer names only in files that announce them, which the exr crate forgets for channels.
+const SHORT_NAME: usize = 31;
+/// Where bits 8 to 15 of the version field stand; all are 0 in our single-part scanline files.
+const VERSION_FLAGS: u64 = 5;
+/// Bit 10 of the version field.
+const LONG_NAMES: u8 = 4;
 
 /// Lossless compression of an EXR file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,7 +63,15 @@ pub fn write(path: &Path, film: &Film, info: &ImageInfo, compression: Compressio
     let size = Vec2(film.window.width() as usize, film.window.height() as usize);
     let layer = Layer::new(size, layer_attributes(film.window, info), encoding, AnyChannels::sort(channels));
     let image = Image { attributes: image_attributes(bounds), layer_data: layer };
-    write_atomically(path, |w| image.write().to_buffered(w).map_err(io_error))
+    let has_long_name = film.planes.iter().any(|plane| plane.name.chars().count() > SHORT_NAME);
+    write_atomically(path, |w| {
+        image.write().to_buffered(&mut *w).map_err(io_error)?;
+        if has_long_name {
+            w.seek(SeekFrom::Start(VERSION_FLAGS))?;
+            w.write_all(&[LONG_NAMES])?;
+        }
+        Ok(())
+    })
 }
 
 fn io_error(e: exr::error::Error) -> io::Error {
@@ -87,12 +102,14 @@ fn image_attributes(display: IntegerBounds) -> ImageAttributes {
 }
 
 fn layer_attributes(window: Window, info: &ImageInfo) -> LayerAttributes {
-    let mut attributes = LayerAttributes::default();
-    // Inside the display window, whose size was checked against EXR's limit.
-    attributes.layer_position = Vec2(window.x0 as i32, window.y0 as i32);
-    attributes.software_name = Some(text(&info.software));
-    attributes.world_to_camera = info.world_to_camera.map(imath);
-    attributes.world_to_normalized_device = info.world_to_ndc.map(imath);
+    let mut attributes = LayerAttributes {
+        // Inside the display window, whose size was checked against EXR's limit.
+        layer_position: Vec2(window.x0 as i32, window.y0 as i32),
+        software_name: Some(text(&info.software)),
+        world_to_camera: info.world_to_camera.map(imath),
+        world_to_normalized_device: info.world_to_ndc.map(imath),
+        ..LayerAttributes::default()
+    };
     let int = |x: u32| AttributeValue::I32(i32::try_from(x).unwrap_or(i32::MAX));
     for (name, value) in [
         ("revision", AttributeValue::Text(text(&info.revision))),

@@ -12,9 +12,8 @@
 //!
 //! Readers check the shape against the file's length before they take memory, and stream; writers stream too.
 
-pub mod header;
-
 mod arrays;
+mod header;
 mod literal;
 mod planes;
 
