@@ -24,13 +24,14 @@ fn verify_covers_every_engine_query_class_and_precision() {
     let lines = report["lines"].as_array().expect("lines");
     let count = |key: &str, value: &str| lines.iter().filter(|line| line[key] == value).count();
     for precision in ["f32", "f64"] {
-        assert_eq!(count("precision", precision), lines.len() / 2);
+        // Some engines exist in one precision only; each answers 5 classes x 2 queries.
+        assert!(count("precision", precision) >= 40 && count("precision", precision) % 10 == 0, "{precision}");
     }
     for class in ["primary", "shadow", "ao", "reflect", "diffuse"] {
         assert_eq!(count("class", class), lines.len() / 5, "{class}");
     }
     for engine in ["brute", "scalar", "packet4", "packet8"] {
-        assert_eq!(count("engine", engine) % 10, 0, "{engine}");
+        assert_eq!(count("engine", engine), 20, "{engine}");
     }
     for line in lines {
         let judged: u64 = ["agree", "unexplained"].iter().filter_map(|key| line["oracle"][key].as_u64()).sum();
@@ -77,4 +78,27 @@ fn info_counts_and_measures() {
     assert_eq!(report["bounds"]["upper"], serde_json::json!([1.0, 1.0, 0.0]));
     let text = run(&dir, "info square.ply").out;
     assert!(text.contains("primitives") && text.contains("SAH cost"), "{text}");
+}
+
+/// Ctrl-C in the middle of a bench: exit code 130, and the output is whole.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_bench_ends_with_130_and_valid_output() {
+    use std::process::{Command, Stdio};
+    let line = "bench builtin:cornell --size 64x64 --rays primary,ao --repeat 1000000 --json";
+    let child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
+        .args(line.split(' '))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary runs");
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    assert!(sent.success());
+    let output = child.wait_with_output().expect("an end");
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{err}");
+    assert!(err.contains("interrupted"), "{err}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert!(report["rows"].is_array());
 }

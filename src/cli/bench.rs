@@ -17,10 +17,10 @@ use crate::scene::description::{Description, Precision};
 use crate::trace::Engines;
 
 /// Scenes of a bench that is not told one.
-const DEFAULT_SCENES: [&str; 2] = ["builtin:sphere-flake", "builtin:cornell"];
+const DEFAULT_SCENES: [&str; 3] = ["builtin:cornell", "builtin:sphere-flake", "builtin:terrain"];
 
 /// Picture of a bench unless `--size` says otherwise.
-const DEFAULT_SIZE: (u32, u32) = (320, 192);
+const DEFAULT_SIZE: (u32, u32) = (384, 224);
 
 const EXAMPLES: &str = "\
 Examples:

@@ -88,8 +88,13 @@ fn one<S: Engines>(
     description: &Description,
     lines: &mut Vec<Line>,
 ) -> Result<()> {
-    let options =
-        Options { rays: args.rays, size: args.camera.size, kinds: args.kinds.clone(), seed: args.seed, preset: args.scene.options.preset() };
+    let options = Options {
+        rays: args.rays,
+        size: args.camera.size,
+        kinds: args.kinds.clone(),
+        seed: args.seed,
+        preset: args.scene.options.preset(),
+    };
     let size = args.camera.size.unwrap_or((4, 3));
     let camera = |bounds| args.camera.choose(description, bounds, size);
     let bar = args.output.progress_bar((2 * args.kinds.len() * S::engines().len()) as u64, "verifying");
@@ -133,7 +138,7 @@ fn row(line: &Line) -> String {
     if !reasons.is_empty() {
         let _infallible = write!(text, "  ({})", reasons.join(", "));
     }
-    for wrong in oracle.first_unexplained.iter().chain(&line.first_difference) {
+    for wrong in oracle.samples.iter().take(1).chain(&line.first_difference) {
         let _infallible = write!(text, "\n     WRONG {wrong}");
     }
     text

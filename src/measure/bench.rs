@@ -151,7 +151,7 @@ impl<S: Engines> Subject<'_, S> {
         let precision = if S::PRECISION == "f64" { Precision::F64 } else { Precision::F32 };
         let counts = self.workers.install(|| truth::judge(self.oracle, precision, batches, scalar, stride));
         let total = counts.total();
-        let first = counts.first_unexplained?;
+        let first = counts.samples.first()?;
         Some(format!("the oracle rejects {} of {total} sampled rays, {first}", counts.unexplained))
     }
 

@@ -8,34 +8,31 @@ use rayon::prelude::*;
 use crate::lanes::Real;
 use crate::measure::answers::Answers;
 use crate::ray::{Hits, Rays};
-use crate::reference::{EngineHit, Oracle, OracleRay, Verdict};
+use crate::reference::{EngineHit, Oracle, OracleRay, Tally, Verdict, Why};
 use crate::scene::description::Precision;
 
-/// Verdicts counted.
+/// A [`Tally`] in words, for tables and JSON.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counts {
     /// Same as the oracle.
     pub agree: u64,
-    /// Different where the oracle's margin allows it, by reason.
+    /// Different where the oracle's margin allows it, by reason; reasons that did not occur are left out.
     pub explained: BTreeMap<String, u64>,
     /// Different for no good reason: must be 0.
     pub unexplained: u64,
-    /// The first unexplained ray, with both answers.
-    pub first_unexplained: Option<String>,
+    /// The first unexplained rays, with both answers.
+    pub samples: Vec<String>,
+}
+
+impl From<Tally> for Counts {
+    fn from(tally: Tally) -> Self {
+        let kinds = Why::ALL.iter().zip(tally.explained).filter(|(_, count)| *count > 0);
+        let explained = kinds.map(|(why, count)| (why.to_string(), count)).collect();
+        Self { agree: tally.agree, explained, unexplained: tally.unexplained, samples: tally.samples }
+    }
 }
 
 impl Counts {
-    fn add(&mut self, ray: usize, verdict: Verdict) {
-        match verdict {
-            Verdict::Agree => self.agree += 1,
-            Verdict::Explained(why) => *self.explained.entry(format!("{why:?}").to_lowercase()).or_default() += 1,
-            Verdict::Unexplained(text) => {
-                self.unexplained += 1;
-                self.first_unexplained.get_or_insert_with(|| format!("ray {ray}: {text}"));
-            }
-        }
-    }
-
     /// Rays judged.
     pub fn total(&self) -> u64 {
         self.agree + self.explained_total() + self.unexplained
@@ -47,8 +44,8 @@ impl Counts {
     }
 }
 
-/// Judges every `stride`-th live ray of `batches`, on the current rayon pool. Rays that an engine may not hit (dead
-/// ones) are judged too: their answer must be a miss.
+/// Judges every `stride`-th ray of `batches`, on the current rayon pool. Dead rays are judged too: their answer must
+/// be a miss.
 pub fn judge<S: Real>(
     oracle: &Oracle,
     precision: Precision,
@@ -58,20 +55,32 @@ pub fn judge<S: Real>(
 ) -> Counts {
     let places = batches.iter().enumerate().flat_map(|(b, rays)| (0..rays.len()).map(move |i| (b, i)));
     let chosen: Vec<(usize, (usize, usize))> = places.enumerate().step_by(stride.max(1)).collect();
-    let verdicts: Vec<(usize, Verdict)> = chosen
-        .into_par_iter()
-        .map(|(number, (b, i))| {
-            let ray = oracle_ray(&batches[b], i);
-            let verdict = match answers {
-                Answers::Closest(hits) => oracle.judge(&ray, engine_hit(&hits[b], i), precision),
-                Answers::Any(flags) => oracle.judge_occluded(&ray, flags[b][i] != 0, precision),
-            };
-            (number, verdict)
-        })
-        .collect();
-    let mut counts = Counts::default();
-    verdicts.into_iter().for_each(|(number, verdict)| counts.add(number, verdict));
-    counts
+    let judge_one = |(number, (b, i)): (usize, (usize, usize))| {
+        let ray = oracle_ray(&batches[b], i);
+        let (hit, verdict) = match answers {
+            Answers::Closest(hits) => {
+                let answer = engine_hit(&hits[b], i);
+                (answer.is_some(), oracle.judge(&ray, answer, precision))
+            }
+            Answers::Any(flags) => {
+                let occluded = flags[b][i] != 0;
+                (occluded, oracle.judge_occluded(&ray, occluded, precision))
+            }
+        };
+        (hit, with_number(verdict, number))
+    };
+    let verdicts: Vec<(bool, Verdict)> = chosen.into_par_iter().map(judge_one).collect();
+    let mut tally = Tally::default();
+    verdicts.iter().for_each(|(hit, verdict)| tally.add(*hit, verdict));
+    tally.into()
+}
+
+/// A fault that says which ray of the set it is about, so that it can be found in a ray file.
+fn with_number(verdict: Verdict, number: usize) -> Verdict {
+    match verdict {
+        Verdict::Unexplained(fault) => Verdict::Unexplained(format!("ray {number}: {fault}")),
+        fine => fine,
+    }
 }
 
 fn oracle_ray<S: Real>(rays: &Rays<S>, i: usize) -> OracleRay {
@@ -92,4 +101,38 @@ fn engine_hit<S: Real>(hits: &Hits<S>, i: usize) -> Option<EngineHit> {
         prim: hits.prim[i],
         inst: hits.inst[i],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::raysets::Query;
+    use crate::scene::assembly::Assembly;
+    use crate::scene::description::{Description, Item, ItemKind, Shape};
+
+    /// The half-space below z = 0 and rays that fall from z = 1, 2, 3: t = 1, 2, 3.
+    #[test]
+    fn a_wrong_answer_is_counted_with_its_ray() {
+        let mut scene = Description::new("floor");
+        let kind = ItemKind::Shape(Shape::HalfSpace);
+        scene.groups[0].items.push(Item { transform: glam::DAffine3::IDENTITY, material: None, kind });
+        let oracle = Oracle::new(&Assembly::new(&scene).unwrap());
+        let batches = crate::measure::testing::falling_rays::<f32>(&[2, 1]);
+        let mut hits = [Hits::new(2), Hits::new(1)];
+        for (b, i, t) in [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 3.0)] {
+            (hits[b].t[i], hits[b].prim[i], hits[b].inst[i]) = (t, 0, 0);
+        }
+        let count = |hits: &[Hits<f32>], stride| {
+            judge(&oracle, Precision::F32, &batches, &Answers::Closest(hits.to_vec()), stride)
+        };
+        let right = count(&hits, 1);
+        assert_eq!((right.agree, right.unexplained, right.total()), (3, 0, 3), "{right:?}");
+        hits[1].t[0] = 2.5;
+        let wrong = count(&hits, 1);
+        assert_eq!((wrong.agree, wrong.unexplained), (2, 1));
+        assert!(wrong.samples[0].starts_with("ray 2: "), "{wrong:?}");
+        assert_eq!(count(&hits, 2).total(), 2, "every second ray");
+        let none = Answers::new(Query::Any, &batches);
+        assert_eq!(judge(&oracle, Precision::F32, &batches, &none, 1).unexplained, 3);
+    }
 }

@@ -67,7 +67,7 @@ impl Line {
 
 /// Rays per class that keep the oracle (brute force up to 10^5 primitives) within seconds.
 pub fn default_rays(instanced_prims: u64) -> u64 {
-    (20_000_000 / instanced_prims.clamp(1, 100_000)).clamp(256, 4096)
+    (4_000_000 / instanced_prims.clamp(1, 100_000)).clamp(256, 4096)
 }
 
 /// Width and height of a picture of about `rays` pixels, 4:3.
@@ -223,7 +223,7 @@ mod tests {
     #[test]
     fn default_sizes_keep_the_oracle_affordable() {
         assert_eq!(default_rays(10), 4096);
-        assert_eq!(default_rays(10_000), 2000);
+        assert_eq!(default_rays(10_000), 400);
         assert_eq!(default_rays(100_000), 256);
         assert_eq!(default_rays(50_000_000), 256);
         assert_eq!(default_rays(0), 4096);
