@@ -241,7 +241,7 @@ mod tests {
         seen.sort_unstable();
         seen.dedup();
         assert_eq!(seen.len(), 114);
-        let flags = |b: usize, i: usize| u8::from((b * 7 + i) % 3 == 0);
+        let flags = |b: usize, i: usize| u8::from((b * 7 + i).is_multiple_of(3));
         let original = Answers::<f64>::Any(
             batches.iter().enumerate().map(|(b, r)| (0..r.len()).map(|i| flags(b, i)).collect()).collect(),
         );
