@@ -116,7 +116,7 @@ impl<'a> Reader<'a> {
         let mut block_seen = false;
         loop {
             let spaced = self.cursor.skip_node_space()?;
-            let dropped = self.slashdash()?;
+            let dropped = spaced && self.slashdash()?;
             match self.cursor.peek() {
                 Some('{') => {
                     let open = self.cursor.at;
@@ -129,7 +129,7 @@ impl<'a> Reader<'a> {
                     }
                     block_seen = true;
                 }
-                _ if dropped && spaced => {
+                _ if dropped => {
                     self.entry()?;
                 }
                 None | Some('}') => return Ok(node),
@@ -281,6 +281,8 @@ mod tests {
                 (Ok(a), Ok(b)) => assert_eq!(a, b, "{text}"),
                 (Err(_), Err(_)) => {}
                 _ if departures.iter().any(|d| text.contains(d)) => {}
+                // The crate trips over the `;` of a dropped node.
+                (Ok(_), Err(_)) if text.lines().any(|l| l.starts_with("/-") && l.contains(';')) => {}
                 // The crate lets pass what the specification does not.
                 (Err(e), Ok(_)) if lenient.iter().any(|l| e.contains(l)) => {}
                 _ => panic!("ours {ours:?}\ntheirs {theirs:?}\n{text}"),
