@@ -72,7 +72,7 @@ fn mesh_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
 /// # Errors
 /// Unknown extensions, unreadable or malformed files.
 pub fn read_mesh(path: &Path) -> Result<MeshFile> {
-    let parse: fn(&Path, &[u8]) -> Result<Mesh> = match extension(path)?.as_str() {
+    let parse: fn(&Path, &[u8]) -> Result<Mesh> = match unpack::inner_extension(path).unwrap_or_default().as_str() {
         "obj" => |path, bytes| obj::parse(path, bytes).map(|file| file.mesh),
         "ply" => ply::parse,
         "stl" => stl::parse,
@@ -84,7 +84,7 @@ pub fn read_mesh(path: &Path) -> Result<MeshFile> {
 
 /// The known extension of `path`, lower case, without the packing's.
 fn extension(path: &Path) -> Result<String> {
-    let inner = unpack::inner_extension(path).unwrap_or_default().to_ascii_lowercase();
+    let inner = unpack::inner_extension(path).unwrap_or_default();
     if EXTENSIONS.contains(&inner.as_str()) {
         return Ok(inner);
     }
