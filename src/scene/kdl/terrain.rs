@@ -1,7 +1,8 @@
 //! A heightfield mesh from value noise; the same bits on every machine (only + - * / on integers and f64).
 //!
 //! Source: K. Perlin, "An Image Synthesizer", SIGGRAPH 1985 (noise on an integer lattice, sums of octaves); the
-//! quintic fade is his "Improving Noise", SIGGRAPH 2002; ridges: F. K. Musgrave in "Texturing and Modeling", 1994.
+//! quintic fade is his "Improving Noise", SIGGRAPH 2002; damping by height: F. K.
+//! Musgrave in "Texturing and Modeling", 1994.
 
 use glam::DVec3;
 
@@ -9,7 +10,7 @@ use super::hash::{mix3, unit};
 use crate::scene::mesh::Mesh;
 
 /// Octaves summed.
-const OCTAVES: u32 = 7;
+const OCTAVES: u32 = 6;
 /// Lattice cells of the lowest octave across the field.
 const CELLS: f64 = 3.0;
 
@@ -36,21 +37,20 @@ pub fn terrain(size: u32, seed: u32) -> Mesh {
     Mesh { positions, triangles, groups: Vec::new() }
 }
 
-/// Height in 0..1 at `x`, `z` in 0..1: ridged octaves, each damped where the one below is low so that valleys are
-/// smooth and peaks rough.
+/// Height in 0..1 at `x`, `z` in 0..1: octaves of noise, each damped where the sum below it is low, so that valleys
+/// are smooth and peaks rough; squared, which widens the valleys.
 fn height(x: f64, z: f64, seed: u32) -> f64 {
-    let (mut sum, mut total, mut amplitude, mut damping) = (0.0, 0.0, 1.0, 1.0);
+    let (mut sum, mut total, mut amplitude) = (0.0, 0.0, 1.0);
     let mut cells = CELLS;
     for octave in 0..OCTAVES {
-        let ridge = 1.0 - (2.0 * noise(x * cells, z * cells, seed.wrapping_add(octave)) - 1.0).abs();
-        let value = ridge * ridge * damping;
-        sum += value * amplitude;
+        let damping = if octave == 0 { 1.0 } else { sum / total };
+        sum += damping * amplitude * noise(x * cells, z * cells, seed.wrapping_add(octave));
         total += amplitude;
-        damping = value.clamp(0.0, 1.0);
         amplitude *= 0.5;
         cells *= 2.0;
     }
-    sum / total
+    let mean = sum / total;
+    mean * mean
 }
 
 /// Value noise in 0..1 at a point of the lattice plane, `x` and `z` not negative.

@@ -248,7 +248,7 @@ impl<'a> Cursor<'a> {
             let rest = self.rest();
             let stop = rest.find(|c| c == '"' || c == '\\' || is_newline(c)).unwrap_or(rest.len());
             match &mut text {
-                Cow::Borrowed(b) if b.is_empty() => text = Cow::Borrowed(&rest[..stop]),
+                Cow::Borrowed("") => text = Cow::Borrowed(&rest[..stop]),
                 _ => text.to_mut().push_str(&rest[..stop]),
             }
             self.at += stop;
