@@ -1,14 +1,14 @@
 //! Tiles over the threads of the current rayon pool.
 
+use std::mem::take;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::options::{Progress, RenderOptions, rect_of};
 use super::pixels::{Painter, add, mean};
-use crate::camera::{Camera, PixelRect, SubPixel, Tiling, fill_tile};
+use crate::camera::{Camera, PixelRect, SubPixel, Tiling, fill_tile, morton_decode};
 use crate::error::Result;
 use crate::film::Film;
 use crate::lanes::Real;
@@ -21,8 +21,8 @@ use crate::trace::{Engine, Engines, engine};
 /// A picture and what it took.
 #[derive(Clone, Debug)]
 pub struct RenderOutput {
-    /// Planes R, G, B (linear Rec.709; background included), A (share of samples that hit something), then the
-    /// wanted AOVs. Tiles not finished are black with alpha 0.
+    /// Planes R, G, B (linear Rec.709, premultiplied), A (coverage: hits, and a background that is not black), then
+    /// the wanted AOVs. Tiles not finished are black with alpha 0.
     pub film: Film,
     /// Live rays traced, by kind.
     pub rays: RayCounts,
@@ -78,31 +78,41 @@ pub fn render_with<S: Real>(
     let job = Job { shader, camera, tiling, rect: rect_of(window), options, progress };
     let tiles = tiling.tiles_in(job.rect);
     let painter = Mutex::new(Painter::new(options.width, options.height, window, &options.aovs));
-    let done = AtomicU64::new(0);
-    let tally = Mutex::new((RayCounts::default(), Counters::default()));
-    tiles.par_iter().for_each_init(TileMemory::default, |memory, &tile| {
+    let one_tile = |memory: &mut TileMemory<S>, &tile: &u32| {
         let finished = job.tile(tile, memory);
-        let mut tally = tally.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        tally.0 += std::mem::take(&mut memory.work.rays);
-        tally.1 += std::mem::take(&mut memory.work.counters);
-        drop(tally);
         if finished {
-            let mut painter = painter.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-            job.paint(memory, &mut painter);
-            drop(painter);
-            done.fetch_add(1, Ordering::Relaxed);
+            job.paint(memory, &mut painter.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
             progress.tile_done(tiles.len() as u64);
         }
-    });
-    let (rays, counters) = tally.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let work = &mut memory.work;
+        Tally { done: u64::from(finished), rays: take(&mut work.rays), counters: take(&mut work.counters) }
+    };
+    let tally = tiles.par_iter().map_init(TileMemory::default, one_tile).reduce(Tally::default, Tally::plus);
     Ok(RenderOutput {
         film: painter.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()).film,
-        rays,
+        rays: tally.rays,
         seconds: start.elapsed().as_secs_f64(),
-        counters,
-        tiles_done: done.into_inner(),
+        counters: tally.counters,
+        tiles_done: tally.done,
         tiles_total: tiles.len() as u64,
     })
+}
+
+/// What tiles add up to.
+#[derive(Default)]
+struct Tally {
+    done: u64,
+    rays: RayCounts,
+    counters: Counters,
+}
+
+impl Tally {
+    fn plus(mut self, other: Self) -> Self {
+        self.done += other.done;
+        self.rays += other.rays;
+        self.counters += other.counters;
+        self
+    }
 }
 
 /// What all tiles of a render share.
@@ -144,7 +154,7 @@ impl<S: Real> Job<'_, S> {
         let count = self.tiling.rays_per_tile();
         memory.pixels.clear();
         memory.pixels.extend((0..count).map(|i| {
-            let (dx, dy) = crate::camera::morton_decode(i);
+            let (dx, dy) = morton_decode(i);
             (x0 + dx, y0 + dy)
         }));
         memory.sums.clear();

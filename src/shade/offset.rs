@@ -54,7 +54,7 @@ mod tests {
             let (position, normal) = (point(0), point(1).normalize());
             let error = position_error::<S>(point(2), position, 1.0, position);
             let signs = DVec3::new(1.0, 1.0, 1.0).copysign(point(3));
-            let found = position + error * signs * 0.999;
+            let found = position + error * signs * 0.9;
             let org = offset_origin::<S>(found, error, normal);
             let height = (DVec3::from(org.map(S::to_f64)) - position).dot(normal);
             assert!(height >= 0.0, "{position} {normal}: {height}");

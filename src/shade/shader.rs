@@ -32,12 +32,12 @@ pub struct Settings {
     pub count: bool,
 }
 
-/// What one primary ray saw. For a miss: the background, alpha 0, infinite distance, invalid ids, zeros.
+/// What one primary ray saw. For a miss: infinite distance, invalid ids, zeros, and what the integrator shows there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Radiance or the integrator's value, linear Rec.709.
     pub radiance: DVec3,
-    /// 1 where something was hit, else 0.
+    /// Whether the radiance is opaque: 1 where something was hit or the integrator shows what lies behind, else 0.
     pub alpha: f64,
     /// Distance from the ray's origin to the hit, scene units.
     pub distance: f64,

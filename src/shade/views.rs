@@ -29,10 +29,11 @@ pub(super) fn depth(out: &mut [Sample]) {
     }
 }
 
-/// Node visits as heat, on a fixed logarithmic scale so that two pictures can be compared.
+/// Node visits as heat, also of misses, on a fixed logarithmic scale so that two pictures can be compared.
 pub(super) fn cost(out: &mut [Sample]) {
     for sample in out {
         sample.radiance = heat((1.0 + sample.nodes).log2() / HOTTEST_LOG2);
+        sample.alpha = 1.0;
     }
 }
 

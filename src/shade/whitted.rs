@@ -19,6 +19,8 @@ impl<S: Real> Shader<'_, S> {
         for i in 0..rays.len() {
             if !work.hits.is_hit(i) && rays.is_live(i) {
                 out[i].radiance = self.background;
+                // A background that shines is part of the picture; a black one stays transparent.
+                out[i].alpha = f64::from(u8::from(self.background != DVec3::ZERO));
             }
         }
         let mut vertices = std::mem::take(&mut work.vertices);
