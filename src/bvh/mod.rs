@@ -1,1 +1,17 @@
-//! (being built)
+//! Bounding volume hierarchies: build (obvhs), collapse to eight children, flat layout, validation, cost.
+//!
+//! The tree knows boxes and leaf classes, not shapes: the caller brings one box and one class number per primitive
+//! and stores each leaf's primitives (at most eight, of one class) as one block of that class.
+
+mod binary;
+mod build;
+mod collapse;
+mod node;
+mod quality;
+
+#[cfg(test)]
+mod tests;
+
+pub use build::{Leaf, Preset, Tree, build};
+pub use node::{Child, LEAF_PRIMS, Node, WIDTH};
+pub use quality::Quality;

@@ -1,1 +1,19 @@
-//! (being built)
+//! The film: named planes of pixels over a data window, and the files they live in (EXR, PNG, NPY).
+//!
+//! All writers go through [`write_atomically`]: a reader sees the old file or the whole new one, never a part.
+//! All readers take hostile input: what a header claims is checked against the file's length before memory is taken.
+
+pub mod atomic;
+pub mod exr;
+pub mod npy;
+pub mod planes;
+pub mod png;
+pub mod srgb;
+
+mod input;
+
+pub use atomic::{Writer, write_atomically};
+pub use planes::{Film, Plane, PlaneData, Window};
+
+#[cfg(test)]
+mod tests;

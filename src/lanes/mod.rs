@@ -1,24 +1,149 @@
-//! (being built)
-/// A scalar the engines compute in: `f32` or `f64`.
-pub trait Real: Copy + Send + Sync + PartialOrd + std::fmt::Debug + 'static {
+//! SIMD lanes: the only door to the `wide` crate.
+//!
+//! A kernel is written once, generic over [`Lanes`], and instantiated for `f32` x 4, 8, 16, `f64` x 2, 4, 8, two
+//! vectors side by side ([`Pair`]), and the plain scalars (width 1: the scalar engines). Every operation here is
+//! exactly rounded or a pure selection, so lane `i` of any width computes the same bits as the scalar:
+//!
+//! * `+ - * /` and `sqrt` are IEEE; there is no approximate reciprocal (`wide`'s `recip` differs between widths).
+//! * [`Lanes::mul_add`] is fused exactly when the build has the `fma` target feature, at every width.
+//! * [`Lanes::fast_min`] and [`Lanes::fast_max`] return the *second* operand when either is NaN (x86 `minps`);
+//!   `a.fast_min(b)` is `if a < b { a } else { b }`. Put the accumulator second where a NaN must not win.
+//!
+//! In registers a mask is whatever the machine likes ([`Lanes::Mask`]); everywhere else (memory, calls, counters)
+//! masks are bit masks in a `u32`, bit `i` for lane `i`.
+
+mod isa;
+mod pair;
+mod scalar;
+mod vector;
+
+use std::fmt::Debug;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+pub use isa::{compiled_features, compiled_isa};
+pub use pair::Pair;
+
+/// Single-precision vectors by width.
+pub use wide::{f32x4, f32x8, f32x16};
+/// Double-precision vectors by width.
+pub use wide::{f64x2, f64x4, f64x8};
+
+/// Widest vector any kernel is instantiated for; per-lane arrays in memory have this length.
+pub const MAX_LANES: usize = 16;
+
+/// A mask in registers: one truth value per lane.
+pub trait LaneMask: Copy + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
+    /// Bit `i` is lane `i`.
+    fn bits(self) -> u32;
+    /// Lane `i` is bit `i`; higher bits are ignored.
+    fn from_bits(bits: u32) -> Self;
+    /// Whether any lane is set.
+    fn any(self) -> bool;
+}
+
+/// A vector of [`Lanes::N`] scalars.
+pub trait Lanes:
+    Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
+    /// The scalar in each lane.
+    type Scalar: Real;
+    /// Result of comparisons.
+    type Mask: LaneMask;
+    /// Number of lanes.
+    const N: usize;
+    /// Mask bits of all lanes.
+    const ALL: u32 = if Self::N == 32 { u32::MAX } else { (1 << Self::N) - 1 };
+
+    /// The same value in every lane.
+    fn splat(x: Self::Scalar) -> Self;
+    /// The first `N` values of `from`; panics if there are fewer.
+    fn load(from: &[Self::Scalar]) -> Self;
+    /// Writes the lanes to the first `N` values of `to`; panics if there are fewer.
+    fn store(self, to: &mut [Self::Scalar]);
+    /// One lane (slow: for rare paths and tests).
+    fn lane(self, i: usize) -> Self::Scalar;
+    /// `if_true` where the mask is set.
+    fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self;
+    /// `if self < other { self } else { other }`.
+    fn fast_min(self, other: Self) -> Self;
+    /// `if self > other { self } else { other }`.
+    fn fast_max(self, other: Self) -> Self;
+    /// `self * b + c`, fused iff the build has FMA.
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// Square root; NaN for negative numbers.
+    fn sqrt(self) -> Self;
+    /// `self < other`, false for NaN.
+    fn cmp_lt(self, other: Self) -> Self::Mask;
+    /// `self <= other`, false for NaN.
+    fn cmp_le(self, other: Self) -> Self::Mask;
+    /// `self == other`, false for NaN.
+    fn cmp_eq(self, other: Self) -> Self::Mask;
+
+    /// `self > other`, false for NaN.
+    #[inline(always)]
+    fn cmp_gt(self, other: Self) -> Self::Mask {
+        other.cmp_lt(self)
+    }
+    /// `self >= other`, false for NaN.
+    #[inline(always)]
+    fn cmp_ge(self, other: Self) -> Self::Mask {
+        other.cmp_le(self)
+    }
+    /// The same value from an f64 constant in every lane.
+    #[inline(always)]
+    fn constant(x: f64) -> Self {
+        Self::splat(Self::Scalar::from_f64(x))
+    }
+}
+
+/// A scalar the engines compute in: `f32` or `f64`. It is its own vector of one lane.
+pub trait Real:
+    Lanes<Scalar = Self, Mask = bool> + PartialOrd + Default + Send + Sync + bytemuck::Pod + 'static
+{
+    /// Half the distance from 1 to the next larger number.
+    const EPSILON: Self;
+    /// Smallest positive normal number.
+    const MIN_POSITIVE: Self;
+    /// Largest finite number.
+    const MAX: Self;
+    /// Positive infinity.
+    const INFINITY: Self;
+    /// Negative infinity.
+    const LOWEST: Self;
+    /// Zero.
+    const ZERO: Self;
+    /// One.
+    const ONE: Self;
     /// From f64, rounded to nearest.
     fn from_f64(x: f64) -> Self;
     /// To f64, exact.
     fn to_f64(self) -> f64;
+    /// Neither NaN nor infinite.
+    fn is_finite(self) -> bool;
+    /// The largest number below a finite `self`.
+    fn next_down(self) -> Self;
+    /// The smallest number above a finite `self`.
+    fn next_up(self) -> Self;
 }
-impl Real for f32 {
-    fn from_f64(x: f64) -> Self {
-        x as f32
-    }
-    fn to_f64(self) -> f64 {
-        f64::from(self)
-    }
+
+/// Three vectors: x, y and z of `N` points or directions.
+pub type Lanes3<V> = [V; 3];
+
+/// Dot product in a fixed operation order: `fma(a.z, b.z, fma(a.y, b.y, a.x * b.x))`.
+#[inline(always)]
+pub fn dot<V: Lanes>(a: Lanes3<V>, b: Lanes3<V>) -> V {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
-impl Real for f64 {
-    fn from_f64(x: f64) -> Self {
-        x
-    }
-    fn to_f64(self) -> f64 {
-        self
-    }
+
+/// A reciprocal that is always finite: components below the smallest normal number count as that number.
+/// With it `(bound - org) * rcp` can overflow to infinity but never gives NaN for finite input.
+#[inline(always)]
+pub fn finite_rcp<V: Lanes>(d: V) -> V {
+    let least = V::splat(V::Scalar::MIN_POSITIVE);
+    V::constant(1.0) / V::select(d.abs().cmp_lt(least), least, d)
 }
+
+#[cfg(test)]
+mod tests;

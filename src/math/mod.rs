@@ -1,1 +1,7 @@
-//! (being built)
+//! Boxes and affine maps in the engines' precision.
+
+mod aabb;
+mod affine;
+
+pub use aabb::Aabb;
+pub use affine::{Affine, normal_to_world, transformed_bounds};

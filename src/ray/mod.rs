@@ -2,6 +2,9 @@
 
 pub mod batch;
 pub mod counters;
+pub mod packet;
+pub mod slab;
 
 pub use batch::{Hits, INVALID_ID, Rays};
 pub use counters::Counters;
+pub use packet::{Candidate, HitPacket, Packet};

@@ -10,5 +10,7 @@ pub mod mesh;
 pub mod obj;
 pub mod ply;
 pub mod stl;
+mod text;
 pub mod unpack;
+mod weld;
 pub mod world;

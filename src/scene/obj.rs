@@ -1,1 +1,322 @@
-//! (being built)
+//! Wavefront OBJ: polygons, groups and material names.
+//!
+//! Source: Alias|Wavefront, "Object Files (.obj)", appendix B1 of the Advanced Visualizer manual, 1995. Read are
+//! `v` (with an optional weight or colour, both ignored), `f` in all four index forms with positive and negative
+//! indices, `g`, `o`, `usemtl` and `mtllib`; `vt`, `vn`, `vp`, `s`, `l` and `p` are passed over; other keywords
+//! (free-form curves among them) are passed over and counted. A face may name vertices that come later in the file.
+//!
+//! Memory stays below 64 bytes per byte of the file.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::mesh::{Mesh, MeshGroup};
+use super::text::{self, Word, Words};
+use crate::error::Result;
+
+/// Most vertices or triangles a mesh may have: numbers are u32 and the largest is kept for "none".
+const MAX_COUNT: usize = u32::MAX as usize - 1;
+/// Most numbers of a `v` statement: x y z, then a colour, then a weight or opacity.
+const MAX_VERTEX_NUMBERS: usize = 7;
+
+/// What an OBJ file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjFile {
+    /// The polygons, fanned in place. Groups have the name of the last `g` or `o` and the last `usemtl` (names run
+    /// to the end of their line and are cut to 255 bytes).
+    pub mesh: Mesh,
+    /// Material libraries in the order of their `mtllib` statements, as written. None of them is opened.
+    pub material_libs: Vec<String>,
+    /// Statements without effect: unknown keywords and faces with fewer than three corners.
+    pub ignored: u64,
+}
+
+/// Reads the bytes of an OBJ file; `file` is only for error messages.
+///
+/// # Errors
+/// At line and column: a word that is not a number where one must be, too few or too many numbers, an index that is
+/// zero or names no vertex. A file with unknown keywords and no vertex at all is refused as not being an OBJ file.
+pub fn parse(file: &Path, bytes: &[u8]) -> Result<ObjFile> {
+    let mut reader = Reader {
+        words: Words::new(file, bytes, 0),
+        out: ObjFile::default(),
+        name: String::new(),
+        material: String::new(),
+        run_first: 0,
+        highest: None,
+        unknown: None,
+    };
+    while let Some(keyword) = reader.words.next() {
+        reader.statement(keyword)?;
+    }
+    reader.finish()
+}
+
+struct Reader<'a> {
+    words: Words<'a>,
+    out: ObjFile,
+    /// Group and material of the faces that follow.
+    name: String,
+    material: String,
+    /// First triangle of the current run.
+    run_first: usize,
+    /// The highest 0-based index used before its vertex was there, and where: checked at the end.
+    highest: Option<(usize, usize)>,
+    /// The first unknown keyword.
+    unknown: Option<Word<'a>>,
+}
+
+impl<'a> Reader<'a> {
+    /// Reads one statement up to the end of its line.
+    fn statement(&mut self, keyword: Word<'a>) -> Result<()> {
+        match keyword.bytes {
+            b"v" => return self.vertex(),
+            b"f" => return self.face(),
+            b"g" | b"o" => self.start_run(false),
+            b"usemtl" => self.start_run(true),
+            b"mtllib" => self.material_lib(),
+            // A comment is never continued: a path in it may well end in a backslash.
+            [b'#', ..] => _ = self.words.rest_of_line(),
+            b"vt" | b"vn" | b"vp" | b"s" | b"l" | b"p" => self.pass_over(),
+            _ => {
+                self.out.ignored += 1;
+                self.unknown.get_or_insert(keyword);
+                self.pass_over();
+            }
+        }
+        Ok(())
+    }
+
+    fn pass_over(&mut self) {
+        while self.words.next_value().is_some() {}
+    }
+
+    fn vertex(&mut self) -> Result<()> {
+        let mut numbers = [0.0; MAX_VERTEX_NUMBERS];
+        let mut count = 0;
+        while let Some(word) = self.words.next_value() {
+            if count == MAX_VERTEX_NUMBERS {
+                let what = format!("expected the end of the line: a vertex has at most {MAX_VERTEX_NUMBERS} numbers");
+                return Err(self.words.error(word.at, what));
+            }
+            numbers[count] = self.words.number(word)?;
+            count += 1;
+        }
+        if count < 3 {
+            return Err(self.words.missing(format!("expected the 3 coordinates of a vertex, found {count}")));
+        }
+        if self.out.mesh.positions.len() >= MAX_COUNT {
+            return Err(self.words.missing("more than 2^32 - 2 vertices"));
+        }
+        self.out.mesh.positions.push(DVec3::new(numbers[0], numbers[1], numbers[2]));
+        Ok(())
+    }
+
+    fn face(&mut self) -> Result<()> {
+        let (mut first, mut last, mut corners) = (0, 0, 0_usize);
+        while let Some(word) = self.words.next_value() {
+            let corner = self.corner(word)?;
+            if corners == 0 {
+                first = corner;
+            } else if corners >= 2 {
+                if self.out.mesh.triangles.len() >= MAX_COUNT {
+                    return Err(self.words.error(word.at, "more than 2^32 - 2 triangles"));
+                }
+                self.out.mesh.triangles.push([first, last, corner]);
+            }
+            last = corner;
+            corners += 1;
+        }
+        self.out.ignored += u64::from(corners < 3);
+        Ok(())
+    }
+
+    /// The 0-based vertex index of `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+    fn corner(&mut self, word: Word<'a>) -> Result<u32> {
+        let mut parts = word.bytes.split(|&b| b == b'/');
+        let index = parts.next().and_then(text::int);
+        let others_fit = parts.by_ref().take(2).all(|part| part.is_empty() || text::int(part).is_some());
+        let (Some(index), true, None) = (index, others_fit, parts.next()) else {
+            let what = format!("expected a vertex index (v, v/vt, v//vn or v/vt/vn), found {}", word.shown());
+            return Err(self.words.error(word.at, what));
+        };
+        let count = self.out.mesh.positions.len();
+        let resolved = match index {
+            0 => None,
+            1.. => usize::try_from(index - 1).ok(),
+            _ => usize::try_from(index.unsigned_abs()).ok().and_then(|back| count.checked_sub(back)),
+        };
+        let Some(resolved) = resolved.filter(|&i| i < MAX_COUNT) else {
+            let what = format!("vertex index {index} names no vertex: {count} are defined up to here");
+            return Err(self.words.error(word.at, what).with_help("indices count from 1, or from -1 backwards"));
+        };
+        if resolved >= count && self.highest.is_none_or(|(highest, _)| resolved > highest) {
+            self.highest = Some((resolved, word.at));
+        }
+        Ok(resolved as u32)
+    }
+
+    /// `g`, `o` or `usemtl`: faces from here on are in another run.
+    fn start_run(&mut self, is_material: bool) {
+        let text = self.rest_as_name();
+        let current = if is_material { &self.material } else { &self.name };
+        if *current != text {
+            self.close_run();
+            *(if is_material { &mut self.material } else { &mut self.name }) = text;
+        }
+    }
+
+    fn close_run(&mut self) {
+        let end = self.out.mesh.triangles.len();
+        if end > self.run_first {
+            self.out.mesh.groups.push(MeshGroup {
+                name: self.name.clone(),
+                material: self.material.clone(),
+                first: self.run_first as u32,
+                count: (end - self.run_first) as u32,
+            });
+            self.run_first = end;
+        }
+    }
+
+    /// The words up to the end of the line with single spaces between: names may hold blanks and `#`.
+    fn rest_as_name(&mut self) -> String {
+        let mut joined = Vec::new();
+        while let Some(word) = self.words.next_in_line() {
+            if !joined.is_empty() {
+                joined.push(b' ');
+            }
+            joined.extend_from_slice(word.bytes);
+        }
+        text::name(&joined)
+    }
+
+    /// `mtllib a.mtl b.mtl`: blanks separate libraries, but writers also leave them in file names, so a library
+    /// ends at a word that ends in `.mtl`.
+    fn material_lib(&mut self) {
+        let mut library = Vec::new();
+        while let Some(word) = self.words.next_in_line() {
+            if !library.is_empty() {
+                library.push(b' ');
+            }
+            library.extend_from_slice(word.bytes);
+            let ends = word.bytes.len() >= 4 && word.bytes[word.bytes.len() - 4..].eq_ignore_ascii_case(b".mtl");
+            if ends {
+                self.out.material_libs.push(String::from_utf8_lossy(&std::mem::take(&mut library)).into_owned());
+            }
+        }
+        if !library.is_empty() {
+            self.out.material_libs.push(String::from_utf8_lossy(&library).into_owned());
+        }
+    }
+
+    fn finish(mut self) -> Result<ObjFile> {
+        let count = self.out.mesh.positions.len();
+        if let Some((highest, at)) = self.highest.filter(|&(highest, _)| highest >= count) {
+            let what = format!("vertex index {} names no vertex: the file has {count}", highest + 1);
+            return Err(self.words.error(at, what));
+        }
+        if let (0, Some(word)) = (count, self.unknown) {
+            let what = format!("expected an OBJ statement such as `v` or `f`, found {}", word.shown());
+            return Err(self.words.error(word.at, what).with_help("the file has no vertex: is it an OBJ file?"));
+        }
+        self.close_run();
+        if let [only] = self.out.mesh.groups.as_slice()
+            && only.name.is_empty()
+            && only.material.is_empty()
+        {
+            self.out.mesh.groups.clear();
+        }
+        Ok(self.out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> ObjFile {
+        parse(Path::new("m.obj"), text.as_bytes()).unwrap()
+    }
+
+    fn first_line_of_error(text: &str) -> String {
+        let error = parse(Path::new("m.obj"), text.as_bytes()).unwrap_err();
+        error.to_string().lines().next().unwrap().to_owned()
+    }
+
+    #[test]
+    fn all_index_forms_name_the_same_triangle() {
+        let vertices = "v 0 0 0\nv 1 0 0 1.0\nv 0 1 0 0.5 0.5 0.5\nvt 0 0\nvn 0 0 1\n";
+        for face in ["f 1 2 3", "f 1/1 2/1 3/1", "f 1//1 2//1 3//1", "f 1/1/1 2/1/1 3/1/1", "f -3 -2/-1 -1/-1/-1"] {
+            let mesh = read(&format!("{vertices}{face}")).mesh;
+            assert_eq!(mesh.positions, [DVec3::ZERO, DVec3::X, DVec3::Y]);
+            assert_eq!(mesh.triangles, [[0, 1, 2]], "{face}");
+            assert_eq!(mesh.groups, []);
+        }
+    }
+
+    #[test]
+    fn polygons_are_fanned_in_place() {
+        let five = "v 0 0 0\nv 1 0 0\nv 2 1 0\nv 1 2 0\nv 0 1 0\n";
+        let mesh = read(&format!("{five}f 3 2 1\nf 1 2 3 4 5\nf 5 4 3\nf 1 2\n")).mesh;
+        assert_eq!(mesh.triangles, [[2, 1, 0], [0, 1, 2], [0, 2, 3], [0, 3, 4], [4, 3, 2]]);
+    }
+
+    #[test]
+    fn line_ends_continuations_comments_and_blanks() {
+        let text =
+            "\u{feff}# C:\\models\\\r\n\r\n  v 0 0 0 # origin\r\nv\t1 0\\\r\n 0\r\nv 0 1 0\\\r\n\r\n#\r\nf 1 2 \\\r\n3";
+        for text in [text.to_owned(), text.replace("\r\n", "\n"), text.replace("\r\n", "\r")] {
+            let out = read(&text);
+            assert_eq!(out.mesh.positions, [DVec3::ZERO, DVec3::X, DVec3::Y]);
+            assert_eq!((out.mesh.triangles.as_slice(), out.ignored), ([[0, 1, 2]].as_slice(), 0));
+        }
+    }
+
+    #[test]
+    fn groups_are_runs_of_name_and_material() {
+        let out = read(
+            "mtllib a.mtl my file.MTL rest\nv 0 0 0\nf 1 1 1\no box\nusemtl Material #25\nf 1 1 1\nf 1 1 1\n\
+             g box\nf 1 1 1\nusemtl red\ng lid  top\nf 1 1 1\ng\n",
+        );
+        let group = |name: &str, material: &str, first, count| MeshGroup {
+            name: name.into(),
+            material: material.into(),
+            first,
+            count,
+        };
+        let expected = [group("", "", 0, 1), group("box", "Material #25", 1, 3), group("lid top", "red", 4, 1)];
+        assert_eq!(out.mesh.groups, expected);
+        assert_eq!(out.material_libs, ["a.mtl", "my file.MTL", "rest"]);
+    }
+
+    #[test]
+    fn odd_but_valid() {
+        assert_eq!(read(""), ObjFile::default());
+        let out = read("f 2 3 1\nv nan -inf 1e400\nv .5 +5. 1E-3\nv 0 0 0\nl 1 2\np 1\ncurv 0 1 \\\n 2\nsurf\nf 1 2\n");
+        assert_eq!(out.mesh.triangles, [[1, 2, 0]], "faces may come before their vertices");
+        assert!(out.mesh.positions[0].x.is_nan());
+        assert_eq!(out.mesh.positions[0].y, f64::NEG_INFINITY);
+        assert_eq!(out.mesh.positions[1], DVec3::new(0.5, 5.0, 1e-3));
+        assert_eq!(out.ignored, 3, "curv, surf and a face of two corners");
+    }
+
+    #[test]
+    fn errors_say_where() {
+        for (text, expected) in [
+            ("v 0 0 0\nv 0 x1 0", "m.obj:2:5: expected a number, found `x1`"),
+            ("v 0 0\n", "m.obj:1:6: expected the 3 coordinates of a vertex, found 2"),
+            ("v 0 0 0 0 0 0 0 0", "m.obj:1:17: expected the end of the line: a vertex has at most 7 numbers"),
+            ("v 0 0 0\nf 1 1 0", "m.obj:2:7: vertex index 0 names no vertex: 1 are defined up to here"),
+            ("v 0 0 0\nf -2 1 1", "m.obj:2:3: vertex index -2 names no vertex: 1 are defined up to here"),
+            ("v 0 0 0\n\n f 1 1 2", "m.obj:3:8: vertex index 2 names no vertex: the file has 1"),
+            ("f 1 1 99999999999", "m.obj:1:7: vertex index 99999999999 names no vertex: 0 are defined up to here"),
+            ("f 1/2/3/4", "m.obj:1:3: expected a vertex index (v, v/vt, v//vn or v/vt/vn), found `1/2/3/4`"),
+            ("f 1/x", "m.obj:1:3: expected a vertex index (v, v/vt, v//vn or v/vt/vn), found `1/x`"),
+            ("\nsolid x", "m.obj:2:1: expected an OBJ statement such as `v` or `f`, found `solid`"),
+        ] {
+            assert_eq!(first_line_of_error(text), expected);
+        }
+    }
+}

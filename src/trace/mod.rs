@@ -1,13 +1,26 @@
-//! The engines behind one trait. (being built)
+//! The engines behind one trait.
+//!
+//! All generic engines run the same kernels at different widths: `brute` and `scalar` at width 1 (without and with
+//! the tree), `packetN` at N lanes. Their hits are equal to the last bit; [`crate::ray::slab`] says why.
 
-use crate::lanes::Real;
-use crate::ray::{Counters, Hits, Rays};
+mod brute;
+mod leaf;
+mod query;
+mod traverse;
+
+use std::marker::PhantomData;
+
+use crate::error::{Error, Result, nearest_name};
+use crate::lanes::{Lanes, Pair, Real, f32x4, f32x8, f32x16, f64x2, f64x4, f64x8};
+use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
+use query::{Query, Stack};
 
 /// Per-thread working memory of engines; grows on use, reusable for any world.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    _private: (),
+    single: Stack<f32>,
+    double: Stack<f64>,
 }
 
 /// A complete path from rays to hits.
@@ -39,30 +52,167 @@ pub trait Engine<S: Real>: Sync {
 
 /// A scalar type with its list of engines.
 pub trait Engines: Real {
-    /// All engines of this precision, baselines first.
-    fn engines() -> &'static [&'static dyn Engine<Self>];
     /// `f32` or `f64`.
     const PRECISION: &'static str;
+    /// All engines of this precision, baselines first.
+    fn engines() -> &'static [&'static dyn Engine<Self>];
+    #[doc(hidden)]
+    fn stack(scratch: &mut Scratch) -> &mut Stack<Self>;
 }
 
 impl Engines for f32 {
-    fn engines() -> &'static [&'static dyn Engine<Self>] {
-        unimplemented!()
-    }
     const PRECISION: &'static str = "f32";
-}
-impl Engines for f64 {
+
     fn engines() -> &'static [&'static dyn Engine<Self>] {
-        unimplemented!()
+        &[
+            &Generic::<f32, false>("brute", PhantomData),
+            &Generic::<f32, true>("scalar", PhantomData),
+            &Generic::<f32x4, true>("packet4", PhantomData),
+            &Generic::<f32x8, true>("packet8", PhantomData),
+            &Generic::<f32x16, true>("packet16", PhantomData),
+        ]
     }
+
+    fn stack(scratch: &mut Scratch) -> &mut Stack<Self> {
+        &mut scratch.single
+    }
+}
+
+impl Engines for f64 {
     const PRECISION: &'static str = "f64";
+
+    fn engines() -> &'static [&'static dyn Engine<Self>] {
+        &[
+            &Generic::<f64, false>("brute", PhantomData),
+            &Generic::<f64, true>("scalar", PhantomData),
+            &Generic::<f64x2, true>("packet2", PhantomData),
+            &Generic::<f64x4, true>("packet4", PhantomData),
+            &Generic::<f64x8, true>("packet8", PhantomData),
+            &Generic::<Pair<f64x8>, true>("packet16", PhantomData),
+        ]
+    }
+
+    fn stack(scratch: &mut Scratch) -> &mut Stack<Self> {
+        &mut scratch.double
+    }
 }
 
 /// The engine called `name`.
 ///
 /// # Errors
 /// A usage error that lists the names and the nearest one.
-pub fn engine<S: Engines>(name: &str) -> crate::error::Result<&'static dyn Engine<S>> {
-    let _ = name;
-    unimplemented!()
+pub fn engine<S: Engines>(name: &str) -> Result<&'static dyn Engine<S>> {
+    let names = || S::engines().iter().map(|e| e.name());
+    S::engines().iter().copied().find(|e| e.name() == name).ok_or_else(|| {
+        let near = nearest_name(name, names()).map_or(String::new(), |n| format!("; did you mean `{n}`?"));
+        let list = names().collect::<Vec<_>>().join(", ");
+        Error::Usage(format!("no engine `{name}` in {}: there are {list}{near}", S::PRECISION))
+    })
+}
+
+/// The generic engine of width `V::N`: over the tree, or (`TREE` false) over every primitive.
+struct Generic<V, const TREE: bool>(&'static str, PhantomData<fn() -> V>);
+
+impl<V: Lanes, const TREE: bool> Generic<V, TREE>
+where
+    V::Scalar: Engines,
+{
+    #[inline(always)]
+    fn packet<const ANY: bool, const COUNT: bool>(
+        world: &World<V::Scalar>,
+        rays: &Rays<V::Scalar>,
+        first: usize,
+        stack: &mut Stack<V::Scalar>,
+        counters: &mut Counters,
+    ) -> (HitPacket<V>, u32) {
+        let (packet, t_max, live) = Packet::<V>::load(rays, first);
+        let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), stack, counters);
+        if COUNT {
+            query.counters.rays += u64::from(live.count_ones());
+        }
+        if live != 0 {
+            if TREE {
+                traverse::world(world, &packet, &mut query, live);
+            } else {
+                brute::world(world, &packet, &mut query, live);
+            }
+        }
+        (query.hit, query.done)
+    }
+
+    fn closest<const COUNT: bool>(
+        world: &World<V::Scalar>,
+        rays: &Rays<V::Scalar>,
+        hits: &mut Hits<V::Scalar>,
+        stack: &mut Stack<V::Scalar>,
+        counters: &mut Counters,
+    ) {
+        for first in (0..rays.len()).step_by(V::N) {
+            let (hit, _) = Self::packet::<false, COUNT>(world, rays, first, stack, counters);
+            hit.store(hits, first);
+        }
+    }
+
+    fn any<const COUNT: bool>(
+        world: &World<V::Scalar>,
+        rays: &Rays<V::Scalar>,
+        out: &mut [u8],
+        stack: &mut Stack<V::Scalar>,
+        counters: &mut Counters,
+    ) {
+        for (i, lanes) in out.chunks_mut(V::N).enumerate() {
+            let (_, done) = Self::packet::<true, COUNT>(world, rays, i * V::N, stack, counters);
+            for (lane, out) in lanes.iter_mut().enumerate() {
+                *out = (done >> lane & 1) as u8;
+            }
+        }
+    }
+}
+
+impl<V: Lanes, const TREE: bool> Engine<V::Scalar> for Generic<V, TREE>
+where
+    V::Scalar: Engines,
+{
+    fn name(&self) -> &'static str {
+        self.0
+    }
+
+    fn lanes(&self) -> usize {
+        V::N
+    }
+
+    fn intersect(
+        &self,
+        world: &World<V::Scalar>,
+        rays: &Rays<V::Scalar>,
+        hits: &mut Hits<V::Scalar>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    ) {
+        hits.reset(rays.len());
+        let stack = V::Scalar::stack(scratch);
+        stack.reserve(world.stack_bound());
+        match counters {
+            Some(counters) => Self::closest::<true>(world, rays, hits, stack, counters),
+            None => Self::closest::<false>(world, rays, hits, stack, &mut Counters::default()),
+        }
+    }
+
+    fn occluded(
+        &self,
+        world: &World<V::Scalar>,
+        rays: &Rays<V::Scalar>,
+        out: &mut Vec<u8>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    ) {
+        out.clear();
+        out.resize(rays.len(), 0);
+        let stack = V::Scalar::stack(scratch);
+        stack.reserve(world.stack_bound());
+        match counters {
+            Some(counters) => Self::any::<true>(world, rays, out, stack, counters),
+            None => Self::any::<false>(world, rays, out, stack, &mut Counters::default()),
+        }
+    }
 }

@@ -1,0 +1,122 @@
+//! Building a tree: binary build, collapse, depth-first emission.
+
+use super::binary;
+use super::collapse::Plan;
+use super::node::{Child, Node, WIDTH};
+use crate::lanes::Real;
+use crate::math::Aabb;
+
+/// How much time a build may spend on the tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Preset {
+    /// Quick build, slower rays.
+    Fast,
+    /// The default: rays within a few per cent of the best at a tenth of its time.
+    #[default]
+    Balanced,
+    /// Slow build, fastest rays.
+    Best,
+}
+
+/// A flat tree over boxes. Nodes are in depth-first order, node 0 is the root; no nodes for no primitives.
+#[derive(Clone, Debug)]
+pub struct Tree<S> {
+    /// Nodes.
+    pub nodes: Vec<Node<S>>,
+    /// Nodes on the longest path from the root.
+    pub depth: u32,
+    /// Box of everything.
+    pub bounds: Aabb<S>,
+}
+
+/// A leaf of a new tree: which primitives go into which block of which class.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Leaf {
+    /// Class of the primitives.
+    pub class: u8,
+    /// Number of the block among the blocks of this class; leaves of a class come in ascending order.
+    pub block: u32,
+    /// Primitives, ascending, at most eight.
+    pub prims: Vec<u32>,
+}
+
+impl<S: Real> Tree<S> {
+    /// A tree over nothing.
+    pub fn empty() -> Self {
+        Self { nodes: Vec::new(), depth: 0, bounds: Aabb::EMPTY }
+    }
+
+    /// Most entries a depth-first traversal can have on its stack: every level leaves up to seven siblings.
+    pub fn stack_bound(&self) -> usize {
+        (WIDTH - 1) * self.depth as usize + 1
+    }
+}
+
+/// Builds a tree over primitives with finite boxes `boxes` and leaf classes `classes` (below 255).
+/// Deterministic: the same input gives the same tree on any number of threads.
+pub fn build<S: Real>(boxes: &[Aabb<S>], classes: &[u8], preset: Preset) -> (Tree<S>, Vec<Leaf>) {
+    assert_eq!(boxes.len(), classes.len());
+    let nodes = binary::build(boxes, preset);
+    if nodes.is_empty() {
+        return (Tree::empty(), Vec::new());
+    }
+    let plan = Plan::new(&nodes, classes);
+    let mut emission =
+        Emission { binary: &nodes, plan: &plan, nodes: Vec::new(), leaves: Vec::new(), blocks: [0; 256] };
+    let depth = emission.run();
+    let tree = Tree { nodes: emission.nodes, depth, bounds: nodes[0].bounds };
+    (tree, emission.leaves)
+}
+
+struct Emission<'a, S> {
+    binary: &'a [binary::Binary<S>],
+    plan: &'a Plan,
+    nodes: Vec<Node<S>>,
+    leaves: Vec<Leaf>,
+    blocks: [u32; 256],
+}
+
+impl<S: Real> Emission<'_, S> {
+    /// Emits everything depth-first and returns the depth.
+    fn run(&mut self) -> u32 {
+        let mut depth = 0;
+        // Binary node to open, where its index goes, its depth.
+        let mut stack = vec![(0usize, None, 1u32)];
+        while let Some((source, slot, level)) = stack.pop() {
+            depth = depth.max(level);
+            let id = self.nodes.len();
+            if let Some((parent, slot)) = slot {
+                let parent: &mut Node<S> = &mut self.nodes[parent];
+                parent.child[slot] = id as u32;
+            }
+            self.nodes.push(Node::empty());
+            let mut children = match self.plan.is_leaf(self.binary, source) {
+                true => vec![source],
+                false => self.plan.children(self.binary, source),
+            };
+            // Large children first: the order in which any-hit rays look.
+            children.sort_by(|&a, &b| self.binary[b].bounds.half_area().total_cmp(&self.binary[a].bounds.half_area()));
+            let mut inner = Vec::new();
+            for (slot, &child) in children.iter().enumerate() {
+                let leaf = self.plan.is_leaf(self.binary, child);
+                let reference = if leaf { self.leaf(child) } else { Child::ROOT };
+                self.nodes[id].push(&self.binary[child].bounds, reference);
+                if !leaf {
+                    inner.push((child, Some((id, slot)), level + 1));
+                }
+            }
+            stack.extend(inner.into_iter().rev());
+        }
+        depth
+    }
+
+    fn leaf(&mut self, source: usize) -> Child {
+        let prims = self.plan.prims(self.binary, source);
+        let class = self.plan.class(source);
+        let block = self.blocks[usize::from(class)];
+        self.blocks[usize::from(class)] += 1;
+        let child = Child { index: block, count: prims.len() as u8, class };
+        self.leaves.push(Leaf { class, block, prims });
+        child
+    }
+}

@@ -1,0 +1,141 @@
+//! From two children to eight: the cheapest cut of the binary tree by dynamic programming.
+//!
+//! Source: Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", HPG
+//! 2017, section 3: for every binary node and every i <= 8, the cheapest forest of at most i wide subtrees that
+//! covers its primitives. Costs: an inner node 1, a leaf 1 per started block of eight, both times their area.
+
+use super::binary::Binary;
+use super::node::{LEAF_PRIMS, WIDTH};
+use crate::lanes::Real;
+use crate::math::Aabb;
+
+/// What the cheapest forest does at a binary node.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Per node: entry 0 says what to do with one tree: 0 a leaf, else an inner node whose left binary child gets
+    /// that many of the eight children. Entry k > 0, for up to k + 1 trees: 0 "as with one tree fewer", else the
+    /// number of trees for the left child.
+    decisions: Vec<[u8; WIDTH]>,
+    /// Primitives below each node.
+    counts: Vec<u32>,
+    /// Class of all primitives below, or [`MIXED`].
+    classes: Vec<u8>,
+}
+
+/// Half the area of a box whose extents are scaled first.
+fn relative_area<S: Real>(bounds: &Aabb<S>, scale: f64) -> f32 {
+    let (lo, hi) = bounds.to_f64();
+    let e = (hi * 0.5 - lo * 0.5) * scale;
+    (e.x * e.y + e.y * e.z + e.z * e.x) as f32
+}
+
+/// Primitives of more than one class.
+const MIXED: u8 = u8::MAX;
+
+impl Plan {
+    /// Plans the collapse of `nodes`, whose leaves are primitives with the given classes.
+    pub fn new<S: Real>(nodes: &[Binary<S>], class_of: &[u8]) -> Self {
+        let mut plan = Self {
+            decisions: vec![[0; WIDTH]; nodes.len()],
+            counts: vec![1; nodes.len()],
+            classes: vec![MIXED; nodes.len()],
+        };
+        let mut costs = vec![[0f32; WIDTH]; nodes.len()];
+        // Extents relative to the root's: areas of a scene of any size fit f32.
+        let extent = nodes.first().map_or(0.0, |n| {
+            let (lo, hi) = n.bounds.to_f64();
+            (hi * 0.5 - lo * 0.5).max_element()
+        });
+        let scale = if extent > 0.0 { (1.0 / extent).min(f64::MAX) } else { 0.0 };
+        for i in (0..nodes.len()).rev() {
+            let area = relative_area(&nodes[i].bounds, scale);
+            match nodes[i].children() {
+                None => {
+                    plan.classes[i] = class_of[nodes[i].left as usize];
+                    costs[i] = [area; WIDTH];
+                }
+                Some([l, r]) => {
+                    plan.counts[i] = plan.counts[l] + plan.counts[r];
+                    plan.classes[i] = if plan.classes[l] == plan.classes[r] { plan.classes[l] } else { MIXED };
+                    costs[i] = plan.inner(i, area, &costs[l], &costs[r]);
+                }
+            }
+        }
+        plan
+    }
+
+    fn inner(&mut self, i: usize, area: f32, left: &[f32; WIDTH], right: &[f32; WIDTH]) -> [f32; WIDTH] {
+        // forests[k]: best split into k + 1 trees, at least one on either side.
+        let mut forests = [(f32::INFINITY, 0u8); WIDTH];
+        for total in 2..=WIDTH {
+            for on_left in 1..total {
+                let cost = left[on_left - 1] + right[total - on_left - 1];
+                if cost < forests[total - 1].0 {
+                    forests[total - 1] = (cost, on_left as u8);
+                }
+            }
+        }
+        let fits = self.counts[i] as usize <= LEAF_PRIMS && self.classes[i] != MIXED;
+        let (best_forest, on_left) = forests[WIDTH - 1];
+        let as_node = area + best_forest;
+        let leaf = fits && area <= as_node;
+        self.decisions[i][0] = if leaf { 0 } else { on_left };
+        let mut costs = [if leaf { area } else { as_node }; WIDTH];
+        for k in 1..WIDTH {
+            let (cost, on_left) = forests[k];
+            // Where areas vanish and everything costs the same, a wide node is flatter than a chain.
+            if cost < costs[k - 1] || (cost == costs[k - 1] && !leaf) {
+                (costs[k], self.decisions[i][k]) = (cost, on_left);
+            } else {
+                costs[k] = costs[k - 1];
+            }
+        }
+        costs
+    }
+
+    /// Whether `node`, as one tree, is a leaf.
+    pub fn is_leaf<S>(&self, nodes: &[Binary<S>], node: usize) -> bool {
+        nodes[node].children().is_none() || self.decisions[node][0] == 0
+    }
+
+    /// Class of a leaf.
+    pub fn class(&self, node: usize) -> u8 {
+        self.classes[node]
+    }
+
+    /// The binary nodes that become the children of the inner wide node made from `node`.
+    pub fn children<S>(&self, nodes: &[Binary<S>], node: usize) -> Vec<usize> {
+        let mut found = Vec::with_capacity(WIDTH);
+        let on_left = usize::from(self.decisions[node][0]);
+        let [l, r] = nodes[node].children().expect("an inner node");
+        let mut stack = vec![(r, WIDTH - on_left), (l, on_left)];
+        while let Some((node, mut trees)) = stack.pop() {
+            while trees > 1 && self.decisions[node][trees - 1] == 0 {
+                trees -= 1;
+            }
+            match nodes[node].children() {
+                Some([l, r]) if trees > 1 => {
+                    let on_left = usize::from(self.decisions[node][trees - 1]);
+                    stack.push((r, trees - on_left));
+                    stack.push((l, on_left));
+                }
+                _ => found.push(node),
+            }
+        }
+        found
+    }
+
+    /// Primitives below `node`, ascending.
+    pub fn prims<S>(&self, nodes: &[Binary<S>], node: usize) -> Vec<u32> {
+        let mut prims = Vec::with_capacity(self.counts[node] as usize);
+        let mut stack = vec![node];
+        while let Some(i) = stack.pop() {
+            match nodes[i].children() {
+                Some([l, r]) => stack.extend([r, l]),
+                None => prims.push(nodes[i].left),
+            }
+        }
+        prims.sort_unstable();
+        prims
+    }
+}

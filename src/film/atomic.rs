@@ -1,0 +1,157 @@
+//! Files that appear whole or not at all.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// What [`write_atomically`] hands to its closure: buffered, `Write + Seek`.
+pub type Writer<'a> = BufWriter<&'a mut File>;
+
+/// Writes a file in one step: into a temporary file beside the target, flushed, synced, then renamed over it.
+///
+/// If `write` fails or panics, or the disk is full, the old file stays as it was and the temporary file is removed.
+/// A killed process leaves the old file (and may leave a hidden `.NAME.*.tmp` beside it). A symbolic link is
+/// followed: the file it names is replaced. The new file gets the rights that any new file gets here.
+///
+/// # Errors
+/// [`Error::Io`] with `path` for whatever `write` or the system report; also if `path` is a directory or device,
+/// which a rename would replace.
+pub fn write_atomically<T>(path: &Path, write: impl FnOnce(&mut Writer<'_>) -> io::Result<T>) -> Result<T> {
+    replace(path, write).map_err(|e| Error::io(path, e))
+}
+
+fn replace<T>(path: &Path, write: impl FnOnce(&mut Writer<'_>) -> io::Result<T>) -> io::Result<T> {
+    let target = resolve(path)?;
+    let dir = match target.parent() {
+        Some(dir) if !dir.as_os_str().is_empty() => dir,
+        _ => Path::new("."),
+    };
+    let mut temp = temp_file(&target, dir)?;
+    let mut writer = BufWriter::new(temp.as_file_mut());
+    let value = write(&mut writer)?;
+    writer.flush()?;
+    drop(writer);
+    temp.as_file().sync_all()?;
+    temp.persist(&target).map_err(|e| e.error)?;
+    sync_directory(dir);
+    Ok(value)
+}
+
+/// The file to replace: symbolic links followed, anything but a regular file or a new name refused.
+fn resolve(path: &Path) -> io::Result<PathBuf> {
+    match std::fs::metadata(path) {
+        Ok(meta) if meta.is_file() => std::fs::canonicalize(path),
+        Ok(_) => Err(io::Error::new(io::ErrorKind::InvalidInput, "expected a regular file or a new name to write to")),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(path.to_path_buf()),
+        Err(e) => Err(e),
+    }
+}
+
+fn temp_file(target: &Path, dir: &Path) -> io::Result<tempfile::NamedTempFile> {
+    let name = target
+        .file_name()
+        .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "expected a path that ends in a file name"))?;
+    let prefix = format!(".{}.", name.to_string_lossy());
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(".tmp");
+    // Temporary files are private by default; this one becomes an ordinary output, so only the umask limits it.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(dir)
+}
+
+/// Makes the rename itself durable. The new file is already in place and whole, so a file system that cannot sync
+/// directories is no reason to report a failed write.
+fn sync_directory(dir: &Path) {
+    #[cfg(unix)]
+    if let Ok(handle) = File::open(dir) {
+        handle.sync_all().ok();
+    }
+    #[cfg(not(unix))]
+    let _ = dir;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use std::io::{Seek, SeekFrom};
+    use std::panic::{AssertUnwindSafe, catch_unwind};
+
+    fn names_in(dir: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_finished_writer_replaces_the_file_and_may_seek() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.bin");
+        fs::write(&path, b"old and longer").unwrap();
+        let value = write_atomically(&path, |w| {
+            w.write_all(b"__cd")?;
+            w.seek(SeekFrom::Start(0))?;
+            w.write_all(b"ab")?;
+            Ok(7)
+        });
+        assert_eq!(value.unwrap(), 7);
+        assert_eq!(fs::read(&path).unwrap(), b"abcd");
+        assert_eq!(names_in(dir.path()), ["a.bin"]);
+    }
+
+    #[test]
+    fn a_failed_writer_leaves_the_old_file_and_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.bin");
+        fs::write(&path, b"old").unwrap();
+        let failed = write_atomically(&path, |w| {
+            w.write_all(&[1; 100_000])?;
+            Err::<(), _>(io::Error::other("the disk is full"))
+        });
+        assert_eq!(failed.unwrap_err().to_string(), format!("{}: the disk is full", path.display()));
+        let panicked = catch_unwind(AssertUnwindSafe(|| {
+            write_atomically(&path, |w| -> io::Result<()> {
+                w.write_all(&[1; 100_000])?;
+                std::panic::resume_unwind(Box::new("a writer's bug"))
+            })
+        }));
+        assert!(panicked.is_err());
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names_in(dir.path()), ["a.bin"]);
+    }
+
+    #[test]
+    fn directories_and_missing_directories_are_errors() {
+        let dir = tempfile::tempdir().unwrap();
+        let is_dir = write_atomically(dir.path(), |_| Ok(())).unwrap_err().to_string();
+        assert!(is_dir.contains("expected a regular file"), "{is_dir}");
+        assert!(write_atomically(&dir.path().join("none/a"), |_| Ok(())).is_err());
+        assert!(write_atomically(Path::new(""), |_| Ok(())).is_err());
+        assert_eq!(names_in(dir.path()), Vec::<String>::new());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_are_refused_links_followed_and_rights_ordinary() {
+        use std::os::unix::fs::PermissionsExt;
+        let device = write_atomically(Path::new("/dev/null"), |_| Ok(())).unwrap_err().to_string();
+        assert!(device.contains("expected a regular file"), "{device}");
+
+        let dir = tempfile::tempdir().unwrap();
+        let (real, link) = (dir.path().join("real"), dir.path().join("link"));
+        fs::write(&real, b"old").unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        write_atomically(&link, |w| w.write_all(b"new")).unwrap();
+        assert_eq!(fs::read(&real).unwrap(), b"new");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        // The same rights as a file that std creates under this umask.
+        let rights = |p: &Path| fs::metadata(p).unwrap().permissions().mode();
+        let plain = dir.path().join("plain");
+        fs::write(&plain, b"").unwrap();
+        assert_eq!(rights(&real), rights(&plain));
+    }
+}

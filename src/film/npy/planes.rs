@@ -1,0 +1,71 @@
+//! Planes of a film as 2-D arrays.
+
+use std::io::{Read, Write};
+use std::path::Path;
+
+use super::arrays::{each_record, open, u32_at};
+use super::header::{self, Descr, Header};
+use crate::error::{Error, Result};
+use crate::film::{PlaneData, write_atomically};
+
+/// Reads a 2-D array of `<f4` or `<u4` as (width, height, samples).
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] with a byte offset if the file is no such array or its length does not fit.
+pub fn read_plane(path: &Path) -> Result<(u32, u32, PlaneData)> {
+    let (reader, len) = open(path)?;
+    plane(path, reader, len)
+}
+
+/// [`read_plane`] of bytes in memory; `file` is only for messages.
+///
+/// # Errors
+/// As [`read_plane`].
+pub fn parse_plane(file: &Path, bytes: &[u8]) -> Result<(u32, u32, PlaneData)> {
+    plane(file, bytes, bytes.len() as u64)
+}
+
+fn plane(file: &Path, mut reader: impl Read, len: u64) -> Result<(u32, u32, PlaneData)> {
+    let header = Header::read(file, &mut reader, len)?;
+    let is_float = match &header.descr {
+        Descr::Plain(format) if format == "<f4" => true,
+        Descr::Plain(format) if format == "<u4" => false,
+        _ => return Err(header.wrong_descr(file, "'<f4' or '<u4': a plane")),
+    };
+    let axis = |i: usize| header.shape.get(i).and_then(|&n| u32::try_from(n).ok());
+    let (2, Some(height), Some(width)) = (header.shape.len(), axis(0), axis(1)) else {
+        return Err(header.wrong_shape(file, "(height, width), each below 2^32"));
+    };
+    header.require_c_order(file)?;
+    let count = header.count(file, 4, len)?;
+    let mut bits = Vec::with_capacity(count);
+    each_record(file, reader, count, 4, |_, record| {
+        bits.push(u32_at(record, 0));
+        Ok(())
+    })?;
+    let data =
+        if is_float { PlaneData::F32(bits.into_iter().map(f32::from_bits).collect()) } else { PlaneData::U32(bits) };
+    Ok((width, height, data))
+}
+
+/// Writes one plane as an array of shape (height, width).
+///
+/// # Errors
+/// [`Error::Usage`] if the sizes do not fit; [`Error::Io`].
+pub fn write_plane(path: &Path, width: u32, height: u32, data: &PlaneData) -> Result<()> {
+    if u64::from(width) * u64::from(height) != data.len() as u64 {
+        return Err(Error::Usage(format!("a plane of {} samples is not {width}x{height}", data.len())));
+    }
+    let format = match data {
+        PlaneData::F32(_) => "<f4",
+        PlaneData::U32(_) => "<u4",
+    };
+    let head = header::bytes(&Descr::Plain(format.to_owned()), &[u64::from(height), u64::from(width)]);
+    write_atomically(path, |w| {
+        w.write_all(&head)?;
+        match data {
+            PlaneData::F32(v) => v.iter().try_for_each(|x| w.write_all(&x.to_le_bytes())),
+            PlaneData::U32(v) => v.iter().try_for_each(|x| w.write_all(&x.to_le_bytes())),
+        }
+    })
+}

@@ -1,0 +1,118 @@
+//! Width 1: the scalars themselves.
+
+use super::{LaneMask, Lanes, Real};
+
+impl LaneMask for bool {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from(self)
+    }
+    #[inline(always)]
+    fn from_bits(bits: u32) -> Self {
+        bits & 1 != 0
+    }
+    #[inline(always)]
+    fn any(self) -> bool {
+        self
+    }
+}
+
+macro_rules! scalar_lanes {
+    ($t:ident) => {
+        impl Lanes for $t {
+            type Scalar = $t;
+            type Mask = bool;
+            const N: usize = 1;
+
+            #[inline(always)]
+            fn splat(x: $t) -> Self {
+                x
+            }
+            #[inline(always)]
+            fn load(from: &[$t]) -> Self {
+                from[0]
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [$t]) {
+                to[0] = self;
+            }
+            #[inline(always)]
+            fn lane(self, _: usize) -> $t {
+                self
+            }
+            #[inline(always)]
+            fn select(mask: bool, if_true: Self, if_false: Self) -> Self {
+                if mask { if_true } else { if_false }
+            }
+            #[inline(always)]
+            fn fast_min(self, other: Self) -> Self {
+                if self < other { self } else { other }
+            }
+            #[inline(always)]
+            fn fast_max(self, other: Self) -> Self {
+                if self > other { self } else { other }
+            }
+            #[inline(always)]
+            fn mul_add(self, b: Self, c: Self) -> Self {
+                // Without the instruction, `f32::mul_add` is a slow library call that still rounds once; the
+                // vectors then round twice, so the scalar must too.
+                if cfg!(any(target_feature = "fma", target_feature = "neon")) {
+                    $t::mul_add(self, b, c)
+                } else {
+                    self * b + c
+                }
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $t::abs(self)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                $t::sqrt(self)
+            }
+            #[inline(always)]
+            fn cmp_lt(self, other: Self) -> bool {
+                self < other
+            }
+            #[inline(always)]
+            fn cmp_le(self, other: Self) -> bool {
+                self <= other
+            }
+            #[inline(always)]
+            fn cmp_eq(self, other: Self) -> bool {
+                self == other
+            }
+        }
+
+        impl Real for $t {
+            const EPSILON: Self = $t::EPSILON / 2.0;
+            const MIN_POSITIVE: Self = $t::MIN_POSITIVE;
+            const MAX: Self = $t::MAX;
+            const INFINITY: Self = $t::INFINITY;
+            const LOWEST: Self = $t::NEG_INFINITY;
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            #[inline(always)]
+            fn from_f64(x: f64) -> Self {
+                x as $t
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                f64::from(self)
+            }
+            #[inline(always)]
+            fn is_finite(self) -> bool {
+                $t::is_finite(self)
+            }
+            fn next_down(self) -> Self {
+                $t::next_down(self)
+            }
+            fn next_up(self) -> Self {
+                $t::next_up(self)
+            }
+        }
+    };
+}
+
+scalar_lanes!(f32);
+scalar_lanes!(f64);

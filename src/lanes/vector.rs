@@ -1,0 +1,141 @@
+//! The vectors of `wide` as [`Lanes`].
+
+use bytemuck::cast;
+use wide::{f32x4, f32x8, f32x16, f64x2, f64x4, f64x8};
+use wide::{u32x4, u32x8, u32x16, u64x2, u64x4, u64x8};
+
+use super::{LaneMask, Lanes};
+
+/// A full-width mask in registers (all bits of a lane set or clear). AVX-512 builds keep it in a mask register.
+#[derive(Clone, Copy, Debug)]
+pub struct VectorMask<V>(V);
+
+macro_rules! vector_lanes {
+    ($v:ident, $s:ident, $n:literal, $int:ident, $bits:expr) => {
+        impl std::ops::BitAnd for VectorMask<$v> {
+            type Output = Self;
+            #[inline(always)]
+            fn bitand(self, other: Self) -> Self {
+                Self(self.0 & other.0)
+            }
+        }
+        impl std::ops::BitOr for VectorMask<$v> {
+            type Output = Self;
+            #[inline(always)]
+            fn bitor(self, other: Self) -> Self {
+                Self(self.0 | other.0)
+            }
+        }
+        impl std::ops::Not for VectorMask<$v> {
+            type Output = Self;
+            #[inline(always)]
+            fn not(self) -> Self {
+                Self(!self.0)
+            }
+        }
+        impl LaneMask for VectorMask<$v> {
+            #[inline(always)]
+            fn bits(self) -> u32 {
+                self.0.to_bitmask() as u32
+            }
+            #[inline(always)]
+            fn from_bits(bits: u32) -> Self {
+                // Test each lane's own bit: one broadcast, one and, one compare.
+                let own = $int::new($bits);
+                let set = ($int::splat(bits.into()) & own).simd_eq(own);
+                Self(cast::<$int, $v>(set))
+            }
+            #[inline(always)]
+            fn any(self) -> bool {
+                self.bits() != 0
+            }
+        }
+
+        impl Lanes for $v {
+            type Scalar = $s;
+            type Mask = VectorMask<$v>;
+            const N: usize = $n;
+
+            #[inline(always)]
+            fn splat(x: $s) -> Self {
+                $v::splat(x)
+            }
+            #[inline(always)]
+            fn load(from: &[$s]) -> Self {
+                let lanes: &[$s; $n] = from.first_chunk().expect("a vector's worth of values");
+                $v::new(*lanes)
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [$s]) {
+                *to.first_chunk_mut().expect("room for a vector") = self.to_array();
+            }
+            #[inline(always)]
+            fn lane(self, i: usize) -> $s {
+                self.to_array()[i]
+            }
+            #[inline(always)]
+            fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self {
+                mask.0.select(if_true, if_false)
+            }
+            #[inline(always)]
+            fn fast_min(self, other: Self) -> Self {
+                $v::fast_min(self, other)
+            }
+            #[inline(always)]
+            fn fast_max(self, other: Self) -> Self {
+                $v::fast_max(self, other)
+            }
+            #[inline(always)]
+            fn mul_add(self, b: Self, c: Self) -> Self {
+                $v::mul_add(self, b, c)
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $v::abs(self)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                $v::sqrt(self)
+            }
+            #[inline(always)]
+            fn cmp_lt(self, other: Self) -> Self::Mask {
+                VectorMask(self.simd_lt(other))
+            }
+            #[inline(always)]
+            fn cmp_le(self, other: Self) -> Self::Mask {
+                VectorMask(self.simd_le(other))
+            }
+            #[inline(always)]
+            fn cmp_eq(self, other: Self) -> Self::Mask {
+                VectorMask(self.simd_eq(other))
+            }
+        }
+    };
+}
+
+const fn powers32<const N: usize>() -> [u32; N] {
+    let mut bits = [0; N];
+    let mut i = 0;
+    while i < N {
+        bits[i] = 1 << i;
+        i += 1;
+    }
+    bits
+}
+
+const fn powers64<const N: usize>() -> [u64; N] {
+    let mut bits = [0; N];
+    let mut i = 0;
+    while i < N {
+        bits[i] = 1 << i;
+        i += 1;
+    }
+    bits
+}
+
+vector_lanes!(f32x4, f32, 4, u32x4, const { powers32() });
+vector_lanes!(f32x8, f32, 8, u32x8, const { powers32() });
+vector_lanes!(f32x16, f32, 16, u32x16, const { powers32() });
+vector_lanes!(f64x2, f64, 2, u64x2, const { powers64() });
+vector_lanes!(f64x4, f64, 4, u64x4, const { powers64() });
+vector_lanes!(f64x8, f64, 8, u64x8, const { powers64() });

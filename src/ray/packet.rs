@@ -1,0 +1,186 @@
+//! `N` rays in registers, their hits, and the one place where hits are committed.
+
+use super::batch::{Hits, INVALID_ID, PAD, Rays};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, finite_rcp};
+use crate::math::Affine;
+
+/// `N` rays with what every kernel needs of them. Shape: lanes; space: the space being traversed.
+#[derive(Clone, Copy, Debug)]
+pub struct Packet<V: Lanes> {
+    /// Origins.
+    pub org: Lanes3<V>,
+    /// Directions, not necessarily unit.
+    pub dir: Lanes3<V>,
+    /// Finite reciprocals of the directions.
+    pub rcp: Lanes3<V>,
+    /// Start of the closed segment.
+    pub t_min: V,
+    /// No hit may be nearer than this: entry into the instance's box (see [`super::slab`]).
+    pub t_floor: V,
+    /// Lanes whose direction is largest along x, y, z (each lane is in exactly one).
+    pub dominant: [u32; 3],
+    /// With `k` the lane's dominant axis: `-dir[k+1] / dir[k]`, `-dir[k+2] / dir[k]`, `1 / dir[k]`
+    /// (the shear of Woop, Benthin and Wald, 2013).
+    pub shear: Lanes3<V>,
+}
+
+impl<V: Lanes> Packet<V> {
+    /// Prepares rays for traversal.
+    #[inline(always)]
+    pub fn new(org: Lanes3<V>, dir: Lanes3<V>, t_min: V) -> Self {
+        let size = dir.map(V::abs);
+        let x_over_y = size[0].cmp_ge(size[1]);
+        let x = x_over_y & size[0].cmp_ge(size[2]);
+        let y = !x & size[1].cmp_ge(size[2]);
+        let z = !x & !y;
+        let pick = |a: V, b: V, c: V| V::select(x, a, V::select(y, b, c));
+        let scale = V::constant(1.0) / pick(dir[0], dir[1], dir[2]);
+        Self {
+            org,
+            dir,
+            rcp: dir.map(finite_rcp),
+            t_min,
+            t_floor: V::splat(V::Scalar::LOWEST),
+            dominant: [x.bits(), y.bits(), z.bits()],
+            shear: [-(pick(dir[1], dir[2], dir[0]) * scale), -(pick(dir[2], dir[0], dir[1]) * scale), scale],
+        }
+    }
+
+    /// Rays `first..first + N` of a batch, their `t_max`, and the lanes that are live.
+    #[inline(always)]
+    pub fn load(rays: &Rays<V::Scalar>, first: usize) -> (Self, V, u32) {
+        let load = |a: &Vec<V::Scalar>| V::load(&a[first..]);
+        let org = [load(&rays.org[0]), load(&rays.org[1]), load(&rays.org[2])];
+        let dir = [load(&rays.dir[0]), load(&rays.dir[1]), load(&rays.dir[2])];
+        let (t_min, t_max) = (load(&rays.t_min), load(&rays.t_max));
+        let most = V::splat(V::Scalar::MAX);
+        let finite = |v: Lanes3<V>| v[0].abs().cmp_le(most) & v[1].abs().cmp_le(most) & v[2].abs().cmp_le(most);
+        let zero = V::constant(0.0);
+        let points = zero.cmp_lt(dir[0].abs()) | zero.cmp_lt(dir[1].abs()) | zero.cmp_lt(dir[2].abs());
+        let live = finite(org) & finite(dir) & points & t_min.cmp_le(t_max);
+        (Self::new(org, dir, t_min), t_max, live.bits())
+    }
+
+    /// The same rays in an instance's space; `floor` is where they enter the instance's box.
+    #[inline(always)]
+    pub fn into_local(&self, to_local: &Affine<V::Scalar>, floor: V) -> Self {
+        let mut local = Self::new(to_local.points(self.org), to_local.vectors(self.dir), self.t_min);
+        local.t_floor = floor;
+        local
+    }
+
+    /// One lane as a packet of width 1.
+    #[inline(always)]
+    pub fn single(&self, lane: usize) -> Packet<V::Scalar> {
+        let pick = |v: Lanes3<V>| v.map(|x| x.lane(lane));
+        Packet {
+            org: pick(self.org),
+            dir: pick(self.dir),
+            rcp: pick(self.rcp),
+            t_min: self.t_min.lane(lane),
+            t_floor: self.t_floor.lane(lane),
+            dominant: self.dominant.map(|bits| bits >> lane & 1),
+            shear: pick(self.shear),
+        }
+    }
+}
+
+/// What a kernel found: lanes where one primitive is hit, and where.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate<V: Lanes> {
+    /// Lanes that hit.
+    pub hit: V::Mask,
+    /// Ray parameters (undefined in other lanes).
+    pub t: V,
+    /// First surface parameter.
+    pub u: V,
+    /// Second surface parameter.
+    pub v: V,
+}
+
+/// The best hits so far of `N` rays. `t` starts as the segment's end.
+#[derive(Clone, Copy, Debug)]
+pub struct HitPacket<V: Lanes> {
+    /// Best `t`, or the segment's end.
+    pub t: V,
+    /// First surface parameter.
+    pub u: V,
+    /// Second surface parameter.
+    pub v: V,
+    /// Primitive numbers.
+    pub prim: [u32; MAX_LANES],
+    /// Instance numbers.
+    pub inst: [u32; MAX_LANES],
+}
+
+impl<V: Lanes> HitPacket<V> {
+    /// Nothing hit yet.
+    #[inline(always)]
+    pub fn new(t_max: V) -> Self {
+        let zero = V::constant(0.0);
+        Self { t: t_max, u: zero, v: zero, prim: [INVALID_ID; MAX_LANES], inst: [INVALID_ID; MAX_LANES] }
+    }
+
+    /// The tie rule, in one place: a candidate in `active` wins if it is nearer, or as near with a smaller
+    /// instance number, or the same instance and a smaller primitive number.
+    #[inline(always)]
+    pub fn commit(&mut self, active: u32, c: &Candidate<V>, prim: u32, inst: u32) {
+        let wanted = c.hit & V::Mask::from_bits(active);
+        let mut wins = (wanted & c.t.cmp_lt(self.t)).bits();
+        let mut ties = (wanted & c.t.cmp_eq(self.t)).bits();
+        while ties != 0 {
+            let lane = ties.trailing_zeros() as usize;
+            if (inst, prim) < (self.inst[lane], self.prim[lane]) {
+                wins |= 1 << lane;
+            }
+            ties &= ties - 1;
+        }
+        if wins == 0 {
+            return;
+        }
+        let mask = V::Mask::from_bits(wins);
+        self.t = V::select(mask, c.t, self.t);
+        self.u = V::select(mask, c.u, self.u);
+        self.v = V::select(mask, c.v, self.v);
+        for lane in 0..V::N {
+            if wins >> lane & 1 != 0 {
+                self.prim[lane] = prim;
+                self.inst[lane] = inst;
+            }
+        }
+    }
+
+    /// One lane as hits of width 1.
+    #[inline(always)]
+    pub fn single(&self, lane: usize) -> HitPacket<V::Scalar> {
+        let mut one = HitPacket::new(self.t.lane(lane));
+        (one.u, one.v) = (self.u.lane(lane), self.v.lane(lane));
+        (one.prim[0], one.inst[0]) = (self.prim[lane], self.inst[lane]);
+        one
+    }
+
+    /// Puts back what [`HitPacket::single`] took out.
+    #[inline(always)]
+    pub fn replace(&mut self, lane: usize, one: &HitPacket<V::Scalar>) {
+        let mask = V::Mask::from_bits(1 << lane);
+        self.t = V::select(mask, V::splat(one.t), self.t);
+        self.u = V::select(mask, V::splat(one.u), self.u);
+        self.v = V::select(mask, V::splat(one.v), self.v);
+        (self.prim[lane], self.inst[lane]) = (one.prim[0], one.inst[0]);
+    }
+
+    /// Writes the hits of rays `first..first + N` of a batch; lanes that hit nothing become misses.
+    #[inline(always)]
+    pub fn store(&self, hits: &mut Hits<V::Scalar>, first: usize) {
+        const { assert!(PAD.is_multiple_of(MAX_LANES)) };
+        let mut found = 0;
+        for lane in 0..V::N {
+            found |= u32::from(self.prim[lane] != INVALID_ID) << lane;
+        }
+        V::select(V::Mask::from_bits(found), self.t, V::splat(V::Scalar::INFINITY)).store(&mut hits.t[first..]);
+        self.u.store(&mut hits.u[first..]);
+        self.v.store(&mut hits.v[first..]);
+        hits.prim[first..first + V::N].copy_from_slice(&self.prim[..V::N]);
+        hits.inst[first..first + V::N].copy_from_slice(&self.inst[..V::N]);
+    }
+}

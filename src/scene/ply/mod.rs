@@ -1,0 +1,217 @@
+//! Stanford PLY: text and both binary forms.
+//!
+//! Source: Greg Turk, "The PLY Polygon File Format", 1994. Read are the element `vertex` (`x`, `y`, `z` of any
+//! scalar type, in any order), the element `face` (the list `vertex_indices` or `vertex_index`, of any types,
+//! polygons fanned in place) and the element `tristrips` (the same list; -1 starts a new strip, every second
+//! triangle is turned so that all keep the winding of the first). Other properties and elements are passed over.
+//! Values keep their declared type: a text number of a `float` property is rounded to f32.
+//!
+//! The header's counts are compared with the length of the file before anything is allocated. Memory stays below
+//! 40 bytes per byte of the file.
+
+mod header;
+mod values;
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use self::header::{Element, Format, Kind};
+use self::values::{Binary, Text, Values};
+use super::mesh::Mesh;
+use crate::error::Result;
+
+/// Most triangles a mesh may have: numbers are u32 and the largest is kept for "none".
+const MAX_TRIANGLES: usize = u32::MAX as usize - 1;
+/// Names of the list that holds a polygon's corners.
+const LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// Reads the bytes of a PLY file; `file` is only for error messages.
+///
+/// # Errors
+/// In the header and in text, at line and column; in binary data, at the byte offset: unknown types and keywords,
+/// counts that do not fit the length of the file, values that are not numbers, lists of negative length, indices
+/// that name no vertex, data after the last element (padding with zeros or white space is allowed).
+pub fn parse(file: &Path, bytes: &[u8]) -> Result<Mesh> {
+    let header = header::read(file, bytes)?;
+    match header.format {
+        Format::Text => read_body(&header.elements, Text::new(file, bytes, header.body)),
+        Format::LittleEndian => read_body(&header.elements, Binary::<false>::new(file, bytes, header.body)),
+        Format::BigEndian => read_body(&header.elements, Binary::<true>::new(file, bytes, header.body)),
+    }
+}
+
+fn read_body<V: Values>(elements: &[Element], mut values: V) -> Result<Mesh> {
+    check_counts(elements, &values)?;
+    let vertices = elements.iter().find(|e| e.name == "vertex");
+    let Some(vertices) = vertices else {
+        return Err(values.header_error(0, "expected an element `vertex` in the header".into()));
+    };
+    if vertices.count >= u64::from(u32::MAX) {
+        return Err(values.header_error(vertices.count_at, "more than 2^32 - 2 vertices".into()));
+    }
+    let mut body = Body { mesh: Mesh::default(), vertices: vertices.count as i64 };
+    for element in elements {
+        match element.name.as_str() {
+            "vertex" => body.vertices(element, &mut values)?,
+            "face" => body.lists(element, &mut values, Body::polygon)?,
+            "tristrips" => body.lists(element, &mut values, Body::strips)?,
+            _ => pass_over(element, &mut values)?,
+        }
+    }
+    values.finish()?;
+    Ok(body.mesh)
+}
+
+/// Refuses counts that cannot be true: every row needs a least number of bytes.
+fn check_counts<V: Values>(elements: &[Element], values: &V) -> Result<()> {
+    let mut left = values.capacity();
+    for element in elements {
+        let row: u64 = element.properties.iter().map(|p| V::least_bytes(p.first_scalar())).sum();
+        match row.checked_mul(element.count).and_then(|need| left.checked_sub(need)) {
+            Some(rest) => left = rest,
+            None => {
+                let what = format!(
+                    "{} rows of `{}` need at least {row} bytes each, but the file has only {left} bytes for them",
+                    element.count, element.name
+                );
+                return Err(values.header_error(element.count_at, what));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn pass_over<V: Values>(element: &Element, values: &mut V) -> Result<()> {
+    // Rows without properties take no bytes: walking over billions of them would be a hang.
+    if element.properties.is_empty() {
+        return Ok(());
+    }
+    for _ in 0..element.count {
+        for property in &element.properties {
+            pass_over_property(property.kind, values)?;
+        }
+    }
+    Ok(())
+}
+
+fn pass_over_property<V: Values>(kind: Kind, values: &mut V) -> Result<()> {
+    match kind {
+        Kind::Scalar(scalar) => values.skip(scalar, 1),
+        Kind::List { count, item } => {
+            let length = values.length(count, item)?;
+            values.skip(item, length)
+        }
+    }
+}
+
+struct Body {
+    mesh: Mesh,
+    /// Number of vertices the header declares, whether they have been read or not.
+    vertices: i64,
+}
+
+impl Body {
+    fn vertices<V: Values>(&mut self, element: &Element, values: &mut V) -> Result<()> {
+        let mut axis_of = vec![None; element.properties.len()];
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let found = element.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)));
+            let Some(found) = found else {
+                let what = format!("expected a scalar property `{name}` of the element `vertex`");
+                return Err(values.header_error(element.count_at, what));
+            };
+            axis_of[found] = Some(axis);
+        }
+        self.mesh.positions.reserve_exact(element.count as usize);
+        for _ in 0..element.count {
+            let mut position = [0.0; 3];
+            for (property, axis) in element.properties.iter().zip(&axis_of) {
+                match (property.kind, axis) {
+                    (Kind::Scalar(scalar), Some(axis)) => position[*axis] = values.float(scalar)?,
+                    (kind, _) => pass_over_property(kind, values)?,
+                }
+            }
+            self.mesh.positions.push(DVec3::from_array(position));
+        }
+        Ok(())
+    }
+
+    /// Reads the rows of an element with an index list, giving each list to `read` with its length.
+    fn lists<V: Values>(
+        &mut self,
+        element: &Element,
+        values: &mut V,
+        read: fn(&mut Self, header::Scalar, u64, &mut V) -> Result<()>,
+    ) -> Result<()> {
+        let is_list = |p: &header::Property| LISTS.contains(&p.name.as_str()) && matches!(p.kind, Kind::List { .. });
+        let wanted = element.properties.iter().position(is_list);
+        if wanted.is_none() && element.count > 0 {
+            let what = format!("expected a list `{}` or `{}` of the element `{}`", LISTS[0], LISTS[1], element.name);
+            return Err(values.header_error(element.count_at, what));
+        }
+        self.mesh.triangles.reserve(element.count as usize);
+        for _ in 0..element.count {
+            for (i, property) in element.properties.iter().enumerate() {
+                match property.kind {
+                    Kind::List { count, item } if wanted == Some(i) => {
+                        let length = values.length(count, item)?;
+                        read(self, item, length, values)?;
+                    }
+                    kind => pass_over_property(kind, values)?,
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn polygon<V: Values>(&mut self, item: header::Scalar, length: u64, values: &mut V) -> Result<()> {
+        let (mut first, mut last) = (0, 0);
+        for i in 0..length {
+            let index = values.int(item)?;
+            let corner = self.corner(index, values)?;
+            if i == 0 {
+                first = corner;
+            } else if i >= 2 {
+                self.push([first, last, corner], values)?;
+            }
+            last = corner;
+        }
+        Ok(())
+    }
+
+    fn strips<V: Values>(&mut self, item: header::Scalar, length: u64, values: &mut V) -> Result<()> {
+        let (mut a, mut b, mut position) = (0, 0, 0_u64);
+        for _ in 0..length {
+            let index = values.int(item)?;
+            if index == -1 {
+                position = 0;
+                continue;
+            }
+            let c = self.corner(index, values)?;
+            if position >= 2 {
+                self.push(if position % 2 == 0 { [a, b, c] } else { [b, a, c] }, values)?;
+            }
+            (a, b) = (b, c);
+            position += 1;
+        }
+        Ok(())
+    }
+
+    fn push<V: Values>(&mut self, triangle: [u32; 3], values: &V) -> Result<()> {
+        if self.mesh.triangles.len() >= MAX_TRIANGLES {
+            return Err(values.error("more than 2^32 - 2 triangles".into()));
+        }
+        self.mesh.triangles.push(triangle);
+        Ok(())
+    }
+
+    fn corner<V: Values>(&self, index: i64, values: &V) -> Result<u32> {
+        if (0..self.vertices).contains(&index) {
+            return Ok(index as u32);
+        }
+        Err(values.error(format!("expected a vertex index from 0 and below {}, found {index}", self.vertices)))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,255 @@
+//! Compiling: records and boxes per primitive, one tree per object, blocks in leaf order, the upper tree.
+
+use std::time::Instant;
+
+use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
+
+use super::{Class, Counts, Instance, Object, World};
+use crate::bvh::{self, LEAF_PRIMS, Leaf, Preset, Tree};
+use crate::error::Result;
+use crate::lanes::Real;
+use crate::math::{Aabb, Affine, transformed_bounds};
+use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind, Placement};
+use crate::scene::description::{Description, Shape};
+use crate::scene::mesh::Mesh;
+use crate::shape::{
+    BLOCK, Block, Cone, Cuboid, Cylinder, Degenerate, Disc, HalfSpace, Placed, PlacedRecord, Sphere, SphereRecord,
+    Triangle, WorldSphere,
+};
+
+// One leaf of a tree is one block.
+const _: () = assert!(BLOCK == LEAF_PRIMS);
+
+impl<S: Real> World<S> {
+    /// Compiles `description` with tree quality `preset`, on the current rayon pool.
+    ///
+    /// # Errors
+    /// Those of [`Assembly::new`].
+    pub fn compile(description: &Description, preset: Preset) -> Result<Self> {
+        let start = Instant::now();
+        let assembly = Assembly::new(description)?;
+        let mut counts = Counts::default();
+        let mut objects = Vec::with_capacity(assembly.objects.len());
+        for object in &assembly.objects {
+            let mut primitives = Primitives::default();
+            for part in &object.parts {
+                primitives.add(part, &mut counts);
+            }
+            objects.push(primitives.build(preset));
+        }
+        let instances: Vec<_> = assembly.placements.iter().map(|p| instance(p, &objects)).collect();
+        let (top, top_blocks, unbounded_instances) = upper_tree(&instances, preset);
+        let materials = assembly.objects.iter().map(|o| material_runs(o, description)).collect();
+        counts.build_seconds = start.elapsed().as_secs_f64();
+        Ok(Self { assembly, objects, instances, top, top_blocks, unbounded_instances, materials, counts })
+    }
+}
+
+/// A primitive's numbers before it has a place in a block.
+#[derive(Clone, Copy, Debug)]
+enum Record<S> {
+    Triangle([S; 9]),
+    Sphere(SphereRecord<S>),
+    Placed(Class, PlacedRecord<S>),
+}
+
+/// Primitives of one object with bounds, and those without.
+#[derive(Debug)]
+struct Primitives<S> {
+    records: Vec<Record<S>>,
+    ids: Vec<u32>,
+    boxes: Vec<Aabb<S>>,
+    classes: Vec<u8>,
+    unbounded: Vec<(PlacedRecord<S>, u32)>,
+}
+
+impl<S> Default for Primitives<S> {
+    fn default() -> Self {
+        Self { records: Vec::new(), ids: Vec::new(), boxes: Vec::new(), classes: Vec::new(), unbounded: Vec::new() }
+    }
+}
+
+impl<S: Real> Primitives<S> {
+    fn add(&mut self, part: &Part, counts: &mut Counts) {
+        match &part.kind {
+            PartKind::Mesh(mesh) => self.add_mesh(part, mesh, counts),
+            PartKind::Shape(shape) => self.add_shape(part, shape, counts),
+        }
+    }
+
+    fn push(&mut self, record: Record<S>, id: u32, bounds: Aabb<S>, class: Class) {
+        self.records.push(record);
+        self.ids.push(id);
+        self.boxes.push(bounds);
+        self.classes.push(class as u8);
+    }
+
+    fn add_mesh(&mut self, part: &Part, mesh: &Mesh, counts: &mut Counts) {
+        // An identity must not cost the file's last bits.
+        let place = |p: DVec3| match part.to_object == DAffine3::IDENTITY {
+            true => p,
+            false => part.to_object.transform_point3(p),
+        };
+        let records: Vec<_> = (0..mesh.triangles.len())
+            .into_par_iter()
+            .map(|i| Triangle::record::<S>(mesh.corners(i).map(place)).map(|n| (n, Triangle::bounds(&n))))
+            .collect();
+        for (i, record) in records.into_iter().enumerate() {
+            match record {
+                Ok((numbers, bounds)) => {
+                    self.push(Record::Triangle(numbers), part.first_prim + i as u32, bounds, Class::Triangle);
+                }
+                Err(Degenerate::NonFinite) => counts.nonfinite += 1,
+                Err(Degenerate::ZeroArea) => counts.degenerate += 1,
+            }
+        }
+    }
+
+    fn add_shape(&mut self, part: &Part, shape: &Shape, counts: &mut Counts) {
+        let (id, m) = (part.first_prim, &part.to_object);
+        if let (Shape::Sphere, Some(sphere)) = (shape, world_sphere::<S>(m)) {
+            self.push(Record::Sphere(sphere), id, WorldSphere::bounds(&sphere), Class::WorldSphere);
+            return;
+        }
+        let class = Class::of(shape);
+        let record = match (class, shape) {
+            (Class::Cone, Shape::Cone { top }) => Placed::record::<S, Cone>(m, *top),
+            (Class::HalfSpace, _) => Placed::record::<S, HalfSpace>(m, 0.0),
+            (Class::Disc, _) => Placed::record::<S, Disc>(m, 0.0),
+            (Class::Cuboid, _) => Placed::record::<S, Cuboid>(m, 0.0),
+            (Class::Cylinder, _) => Placed::record::<S, Cylinder>(m, 0.0),
+            _ => Placed::record::<S, Sphere>(m, 0.0),
+        };
+        match record {
+            None => counts.singular += 1,
+            Some(numbers) if class == Class::HalfSpace => self.unbounded.push((numbers, id)),
+            Some(numbers) => {
+                let bounds = Placed::bounds(&numbers);
+                if bounds.is_bounded() {
+                    self.push(Record::Placed(class, numbers), id, bounds, class);
+                } else {
+                    counts.singular += 1;
+                }
+            }
+        }
+    }
+
+    fn build(self, preset: Preset) -> Object<S> {
+        let (tree, leaves) = bvh::build(&self.boxes, &self.classes, preset);
+        let mut object = Object {
+            tree,
+            triangles: Vec::new(),
+            spheres: Vec::new(),
+            placed: Default::default(),
+            unbounded: Vec::new(),
+        };
+        for leaf in &leaves {
+            self.fill(&mut object, leaf);
+        }
+        for chunk in self.unbounded.chunks(BLOCK) {
+            let mut block = Block::empty();
+            for (i, (numbers, id)) in chunk.iter().enumerate() {
+                block.set(i, *numbers, *id);
+            }
+            object.unbounded.push(block);
+        }
+        object
+    }
+
+    fn fill(&self, object: &mut Object<S>, leaf: &Leaf) {
+        // Leaves of a class come in the order of their blocks.
+        match Class::ALL[usize::from(leaf.class)] {
+            Class::Triangle => object.triangles.push(Block::empty()),
+            Class::WorldSphere => object.spheres.push(Block::empty()),
+            class => object.placed[class as usize].push(Block::empty()),
+        }
+        let at = leaf.block as usize;
+        for (i, &p) in leaf.prims.iter().enumerate() {
+            let id = self.ids[p as usize];
+            match self.records[p as usize] {
+                Record::Triangle(n) => object.triangles[at].set(i, n, id),
+                Record::Sphere(n) => object.spheres[at].set(i, n, id),
+                Record::Placed(class, n) => object.placed[class as usize][at].set(i, n, id),
+            }
+        }
+    }
+}
+
+/// Centre and radius of a unit sphere's image, if the map keeps it a sphere (a rotation with one scale).
+fn world_sphere<S: Real>(m: &DAffine3) -> Option<SphereRecord<S>> {
+    let [x, y, z] = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis];
+    let square = x.length_squared();
+    let alike = |a: f64| (a - square).abs() <= 1e-14 * square;
+    let right = |a: f64| a.abs() <= 1e-14 * square;
+    let round =
+        alike(y.length_squared()) && alike(z.length_squared()) && right(x.dot(y)) && right(y.dot(z)) && right(z.dot(x));
+    let numbers = [m.translation.x, m.translation.y, m.translation.z, square.sqrt()].map(S::from_f64);
+    (round && numbers.iter().all(|n| n.is_finite()) && numbers[3] > S::ZERO).then_some(numbers)
+}
+
+fn instance<S: Real>(placement: &Placement, objects: &[Object<S>]) -> Instance<S> {
+    let bounds = objects[placement.object as usize].bounds();
+    let m = &placement.to_world;
+    let identity = *m == DAffine3::IDENTITY;
+    let to_local = Affine::from_f64(&m.inverse());
+    let world = if identity || bounds.is_empty() {
+        bounds
+    } else if bounds.is_bounded() {
+        let (lo, hi) = bounds.to_f64();
+        let (world_lo, world_hi) = transformed_bounds(m, lo, hi);
+        // The map's rounding moves a hit by some ulps of the numbers that are added up on the way.
+        let reach = transformed_bounds(&DAffine3 { matrix3: m.matrix3, translation: DVec3::ZERO }, lo, hi);
+        let size = reach.0.abs().max(reach.1.abs()).max(m.translation.abs()).max_element();
+        let slack = DVec3::splat(32.0 * S::EPSILON.to_f64() * size);
+        Aabb::enclosing(world_lo - slack, world_hi + slack)
+    } else {
+        Aabb::EVERYTHING
+    };
+    Instance { object: placement.object, identity, to_local, bounds: world }
+}
+
+type UpperTree<S> = (Tree<S>, Vec<[u32; LEAF_PRIMS]>, Vec<u32>);
+
+fn upper_tree<S: Real>(instances: &[Instance<S>], preset: Preset) -> UpperTree<S> {
+    let bounded = |i: &u32| instances[*i as usize].bounds.is_bounded();
+    let present = (0..instances.len() as u32).filter(|&i| !instances[i as usize].bounds.is_empty());
+    let (ids, unbounded): (Vec<u32>, Vec<u32>) = present.partition(bounded);
+    if let [only] = instances
+        && only.identity
+    {
+        return (Tree::empty(), Vec::new(), unbounded);
+    }
+    let boxes: Vec<_> = ids.iter().map(|&i| instances[i as usize].bounds).collect();
+    let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], preset);
+    let blocks = leaves
+        .iter()
+        .map(|leaf| {
+            let mut block = [u32::MAX; LEAF_PRIMS];
+            for (slot, &p) in block.iter_mut().zip(&leaf.prims) {
+                *slot = ids[p as usize];
+            }
+            block
+        })
+        .collect();
+    (tree, blocks, unbounded)
+}
+
+/// First primitive and material of each run of an object.
+fn material_runs(object: &AssemblyObject, description: &Description) -> Vec<(u32, u32)> {
+    let named = |name: &str| description.materials.iter().position(|m| m.name == name).map(|i| i as u32);
+    let mut runs = Vec::new();
+    for part in &object.parts {
+        runs.push((part.first_prim, part.material.unwrap_or(0)));
+        if let (None, PartKind::Mesh(mesh)) = (part.material, &part.kind) {
+            for group in &mesh.groups {
+                runs.push((part.first_prim + group.first, named(&group.material).unwrap_or(0)));
+            }
+        }
+    }
+    // Where two runs begin at one primitive the later one, the group's, counts.
+    runs.reverse();
+    runs.sort_by_key(|(first, _)| *first);
+    runs.dedup_by_key(|(first, _)| *first);
+    runs
+}

@@ -1,0 +1,231 @@
+//! The world: flat arrays that engines trace, compiled once from a description.
+//!
+//! An object is a tree over blocks of primitives in one space; an instance places an object. A world whose only
+//! instance is the identity is traced without an upper tree.
+
+mod compile;
+mod surface;
+
+use glam::DVec3;
+
+pub use crate::bvh::Preset;
+pub use surface::Surface;
+
+use super::assembly::Assembly;
+use super::description::Shape;
+use crate::bvh::Tree;
+use crate::lanes::Real;
+use crate::math::{Aabb, Affine};
+use crate::shape::{Block, Placed, Triangle, WorldSphere};
+
+/// Leaf classes of object trees: what a block holds. [`Class::ALL`]`[i] as u8 == i`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Class {
+    /// Triangles ([`Object::triangles`]).
+    Triangle,
+    /// World-space spheres ([`Object::spheres`]).
+    WorldSphere,
+    /// Canonical shapes under transforms ([`Object::placed`], one list per class).
+    Sphere,
+    /// Discs.
+    Disc,
+    /// Boxes.
+    Cuboid,
+    /// Cylinders.
+    Cylinder,
+    /// Cones.
+    Cone,
+    /// Half-spaces: without bounds, kept in [`Object::unbounded`].
+    HalfSpace,
+}
+
+impl Class {
+    /// All classes by number.
+    pub const ALL: [Self; 8] = [
+        Self::Triangle,
+        Self::WorldSphere,
+        Self::Sphere,
+        Self::Disc,
+        Self::Cuboid,
+        Self::Cylinder,
+        Self::Cone,
+        Self::HalfSpace,
+    ];
+
+    fn of(shape: &Shape) -> Self {
+        match shape {
+            Shape::Sphere => Self::Sphere,
+            Shape::HalfSpace => Self::HalfSpace,
+            Shape::Disc => Self::Disc,
+            Shape::Cuboid => Self::Cuboid,
+            // A cone that does not narrow is a cylinder.
+            Shape::Cone { top } if *top >= 1.0 => Self::Cylinder,
+            Shape::Cylinder => Self::Cylinder,
+            Shape::Cone { .. } => Self::Cone,
+        }
+    }
+}
+
+/// Geometry in one space with its tree.
+#[derive(Clone, Debug)]
+pub struct Object<S> {
+    /// Tree whose leaves are blocks; the leaf class is a [`Class`].
+    pub tree: Tree<S>,
+    /// Blocks of triangles.
+    pub triangles: Vec<Block<S, { Triangle::FIELDS }>>,
+    /// Blocks of world-space spheres.
+    pub spheres: Vec<Block<S, { WorldSphere::FIELDS }>>,
+    /// Blocks of transformed shapes by class; the lists of triangles, spheres and half-spaces are empty.
+    pub placed: [Vec<Block<S, { Placed::FIELDS }>>; Class::ALL.len()],
+    /// Half-spaces: tested for every ray.
+    pub unbounded: Vec<Block<S, { Placed::FIELDS }>>,
+}
+
+/// An object placed in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Instance<S> {
+    /// Index into [`World::objects`].
+    pub object: u32,
+    /// Object space is world space: the packet is used as it is.
+    pub identity: bool,
+    /// World to object space.
+    pub to_local: Affine<S>,
+    /// World box, widened by the rounding of the map; infinite if the object has no bounds.
+    pub bounds: Aabb<S>,
+}
+
+/// Compiled scene in precision `S`.
+#[derive(Debug)]
+pub struct World<S> {
+    /// What prim and inst numbers mean.
+    pub assembly: Assembly,
+    /// Distinct objects, parallel to the assembly's.
+    pub objects: Vec<Object<S>>,
+    /// Instances, parallel to the assembly's placements.
+    pub instances: Vec<Instance<S>>,
+    /// Tree over bounded instances; a leaf block holds instance numbers ([`World::top_blocks`]).
+    pub top: Tree<S>,
+    /// Instance numbers of the upper tree's leaves.
+    pub top_blocks: Vec<[u32; crate::bvh::LEAF_PRIMS]>,
+    /// Instances without bounds.
+    pub unbounded_instances: Vec<u32>,
+    /// Per object: first primitive of each run and its material, ascending.
+    materials: Vec<Vec<(u32, u32)>>,
+    counts: Counts,
+}
+
+/// What compiling found.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    nonfinite: u64,
+    degenerate: u64,
+    singular: u64,
+    build_seconds: f64,
+}
+
+/// Counts and sizes of a world, for `info` and `trace --json`.
+#[derive(Clone, Debug, Default)]
+pub struct WorldStats {
+    /// Distinct objects.
+    pub objects: u64,
+    /// Instances.
+    pub instances: u64,
+    /// Primitives stored.
+    pub prims: u64,
+    /// Primitives counted once per instance.
+    pub instanced_prims: u64,
+    /// Triangles dropped because a vertex is not finite (or overflows the precision).
+    pub dropped_nonfinite: u64,
+    /// Triangles dropped because their area is zero.
+    pub dropped_degenerate: u64,
+    /// Shapes dropped because their transform cannot be inverted in this precision.
+    pub dropped_singular: u64,
+    /// Inner nodes over all trees.
+    pub nodes: u64,
+    /// Leaves over all trees.
+    pub leaves: u64,
+    /// Deepest tree, inner nodes on a path.
+    pub depth: u32,
+    /// SAH cost of the tree with most primitives (node 1, leaf block 1).
+    pub sah_cost: f64,
+    /// Bytes of nodes.
+    pub node_bytes: u64,
+    /// Bytes of primitive storage.
+    pub prim_bytes: u64,
+    /// Seconds spent compiling (trees and storage).
+    pub build_seconds: f64,
+}
+
+impl<S: Real> World<S> {
+    /// Whether the world is one object in its own space, traced without the upper tree.
+    pub fn is_single_object(&self) -> bool {
+        matches!(&self.instances[..], [only] if only.identity)
+    }
+
+    /// Finite world bounds (lower and upper corner) of all bounded geometry; `None` if there is none.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let mut all = Aabb::<S>::EMPTY;
+        for instance in &self.instances {
+            if instance.bounds.is_bounded() {
+                all = all.union(&instance.bounds);
+            } else if instance.identity {
+                // The root group often holds a ground plane: frame what stands on it.
+                all = all.union(&self.objects[instance.object as usize].tree.bounds);
+            }
+        }
+        (!all.is_empty()).then(|| all.to_f64())
+    }
+
+    /// Entries a traversal stack needs at most, upper tree and object tree together.
+    pub fn stack_bound(&self) -> usize {
+        self.top.stack_bound() + self.objects.iter().map(|o| o.tree.stack_bound()).max().unwrap_or(0)
+    }
+
+    /// Counts and sizes.
+    pub fn stats(&self) -> WorldStats {
+        let mut stats = WorldStats {
+            objects: self.objects.len() as u64,
+            instances: self.instances.len() as u64,
+            instanced_prims: self.assembly.instanced_prims(),
+            dropped_nonfinite: self.counts.nonfinite,
+            dropped_degenerate: self.counts.degenerate,
+            dropped_singular: self.counts.singular,
+            build_seconds: self.counts.build_seconds,
+            ..Default::default()
+        };
+        let mut most = 0;
+        for object in &self.objects {
+            let q = object.tree.quality();
+            let unbounded: usize = object.unbounded.iter().map(Block::len).sum();
+            stats.prims += (q.prims + unbounded) as u64;
+            stats.nodes += q.nodes as u64;
+            stats.leaves += q.leaves as u64;
+            stats.depth = stats.depth.max(object.tree.depth);
+            stats.node_bytes += size_of_val(&object.tree.nodes[..]) as u64;
+            stats.prim_bytes += object.prim_bytes() as u64;
+            if q.prims > most {
+                (most, stats.sah_cost) = (q.prims, q.sah_cost);
+            }
+        }
+        let q = self.top.quality();
+        stats.nodes += q.nodes as u64;
+        stats.leaves += q.leaves as u64;
+        stats.depth = stats.depth.max(self.top.depth);
+        stats.node_bytes += size_of_val(&self.top.nodes[..]) as u64;
+        stats.prim_bytes += (size_of_val(&self.instances[..]) + size_of_val(&self.top_blocks[..])) as u64;
+        stats
+    }
+}
+
+impl<S: Real> Object<S> {
+    fn prim_bytes(&self) -> usize {
+        let placed: usize = self.placed.iter().map(|list| size_of_val(&list[..])).sum();
+        size_of_val(&self.triangles[..]) + size_of_val(&self.spheres[..]) + placed + size_of_val(&self.unbounded[..])
+    }
+
+    /// Box of everything, infinite with half-spaces.
+    pub fn bounds(&self) -> Aabb<S> {
+        if self.unbounded.is_empty() { self.tree.bounds } else { Aabb::EVERYTHING }
+    }
+}

@@ -1,0 +1,39 @@
+//! The canonical box [-1, 1]^3 as three slabs (Kay, Kajiya, "Ray Tracing Complex Scenes", 1986).
+
+use glam::DVec3;
+
+use super::span::{Solid, Span};
+use crate::lanes::{LaneMask, Lanes, Lanes3, finite_rcp};
+
+/// The canonical box. Faces: 0..=5 for -x, +x, -y, +y, -z, +z.
+#[derive(Clone, Copy, Debug)]
+pub struct Cuboid;
+
+impl Solid for Cuboid {
+    const LO: DVec3 = DVec3::NEG_ONE;
+    const HI: DVec3 = DVec3::ONE;
+
+    #[inline(always)]
+    fn span<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, _: V::Scalar) -> Span<V> {
+        let slab = |axis: usize| {
+            let rcp = finite_rcp(d[axis]);
+            let (low, high) = ((V::constant(-1.0) - o[axis]) * rcp, (V::constant(1.0) - o[axis]) * rcp);
+            let forward = low.cmp_le(high);
+            let (low_face, high_face) = (V::constant(2.0 * axis as f64), V::constant(2.0 * axis as f64 + 1.0));
+            Span {
+                hit: V::Mask::from_bits(V::ALL),
+                t_in: V::select(forward, low, high),
+                t_out: V::select(forward, high, low),
+                face_in: V::select(forward, low_face, high_face),
+                face_out: V::select(forward, high_face, low_face),
+            }
+        };
+        slab(0).intersect(&slab(1)).intersect(&slab(2))
+    }
+
+    fn normal(_: DVec3, face: u32, _: f64) -> DVec3 {
+        let mut n = DVec3::ZERO;
+        n[(face as usize / 2).min(2)] = if face % 2 == 0 { -1.0 } else { 1.0 };
+        n
+    }
+}

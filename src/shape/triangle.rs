@@ -1,0 +1,206 @@
+//! Triangles: watertight test in the ray's own sheared frame.
+//!
+//! Source: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. Departures:
+//! * Edge functions are `mul, mul, sub` and never fused: exactly antisymmetric, so both neighbours of an edge see
+//!   the same number with opposite sign, and their signs are never wrong, at worst zero.
+//! * Zero counts as inside for both neighbours (the tie rule then decides), so no double-precision restart is
+//!   needed on edges. It is kept for determinants that under- or overflow the precision.
+//! * The winding is not looked at: both sides are hit.
+//! * `t` is the barycentric mean of the corners' depths, moved into the interval of the triangle's own box
+//!   (see [`crate::ray::slab`]); so even for a sliver seen edge-on it stays on the triangle.
+//!
+//! Watertight: the sheared corners depend on the ray and the vertex only, and in the sheared plane the test is a
+//! sign test without rounding errors in sign.
+
+use glam::DVec3;
+
+use crate::lanes::{LaneMask, Lanes, Real};
+use crate::math::Aabb;
+use crate::ray::slab::Interval;
+use crate::ray::{Candidate, Packet};
+
+/// The triangle kind: nine numbers, three corners' x, y, z.
+#[derive(Clone, Copy, Debug)]
+pub struct Triangle;
+
+/// Why a triangle can never be hit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Degenerate {
+    /// A corner is NaN or infinite (in the engines' precision).
+    NonFinite,
+    /// Its corners lie on a line.
+    ZeroArea,
+}
+
+impl Triangle {
+    /// Numbers per triangle.
+    pub const FIELDS: usize = 9;
+
+    /// Corners rounded to `S`, or why this triangle is dropped.
+    ///
+    /// # Errors
+    /// [`Degenerate`] triangles.
+    pub fn record<S: Real>(corners: [DVec3; 3]) -> Result<[S; 9], Degenerate> {
+        let mut numbers = [S::ZERO; 9];
+        for (i, p) in corners.into_iter().enumerate() {
+            for axis in 0..3 {
+                numbers[3 * i + axis] = S::from_f64(p[axis]);
+            }
+        }
+        if !numbers.iter().all(|x| x.is_finite()) {
+            return Err(Degenerate::NonFinite);
+        }
+        // Scaled by a power of two so that products of tiny or huge coordinates neither vanish nor overflow.
+        let largest = numbers.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
+        let scale = if largest > 0.0 { (-largest.log2().floor().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 };
+        let [a, b, c] = Self::corners(&numbers).map(|p| p * scale);
+        if (b - a).cross(c - a) == DVec3::ZERO {
+            return Err(Degenerate::ZeroArea);
+        }
+        Ok(numbers)
+    }
+
+    /// The stored corners in f64.
+    pub fn corners<S: Real>(numbers: &[S; 9]) -> [DVec3; 3] {
+        [0, 3, 6].map(|i| DVec3::new(numbers[i].to_f64(), numbers[i + 1].to_f64(), numbers[i + 2].to_f64()))
+    }
+
+    /// Box of the stored corners, exact.
+    #[inline(always)]
+    pub fn bounds<S: Real>(n: &[S; 9]) -> Aabb<S> {
+        let low = |a: usize| n[a].fast_min(n[a + 3]).fast_min(n[a + 6]);
+        let high = |a: usize| n[a].fast_max(n[a + 3]).fast_max(n[a + 6]);
+        Aabb { lo: [low(0), low(1), low(2)], hi: [high(0), high(1), high(2)] }
+    }
+
+    /// Nearest hit of `N` rays on one triangle: lanes of `active` where the line meets the triangle at
+    /// `t_min <= t`. `u` and `v` are the weights of the second and third corner.
+    #[inline(always)]
+    pub fn intersect<V: Lanes>(
+        packet: &Packet<V>,
+        n: &[V::Scalar; 9],
+        active: u32,
+        mut commit: impl FnMut(&Candidate<V>, u32),
+    ) {
+        // One pass per dominant axis present; coherent packets have one.
+        for axis in 0..3 {
+            let lanes = packet.dominant[axis] & active;
+            if lanes != 0 {
+                let candidate = match axis {
+                    0 => Self::along::<V, 0>(packet, n, lanes),
+                    1 => Self::along::<V, 1>(packet, n, lanes),
+                    _ => Self::along::<V, 2>(packet, n, lanes),
+                };
+                if let Some(candidate) = candidate {
+                    commit(&candidate, lanes);
+                }
+            }
+        }
+    }
+
+    /// The test for lanes whose dominant axis is `K`.
+    #[inline(always)]
+    fn along<V: Lanes, const K: usize>(packet: &Packet<V>, n: &[V::Scalar; 9], lanes: u32) -> Option<Candidate<V>> {
+        let (kx, ky) = ((K + 1) % 3, (K + 2) % 3);
+        let corner = |i: usize| {
+            let z = V::splat(n[3 * i + K]) - packet.org[K];
+            let x = packet.shear[0].mul_add(z, V::splat(n[3 * i + kx]) - packet.org[kx]);
+            let y = packet.shear[1].mul_add(z, V::splat(n[3 * i + ky]) - packet.org[ky]);
+            (x, y, z)
+        };
+        let (ax, ay, az) = corner(0);
+        let (bx, by, bz) = corner(1);
+        let (cx, cy, cz) = corner(2);
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let zero = V::constant(0.0);
+        let outside = u.fast_min(v).fast_min(w).cmp_lt(zero) & zero.cmp_lt(u.fast_max(v).fast_max(w));
+        let maybe = !outside & V::Mask::from_bits(lanes);
+        if !maybe.any() {
+            return None;
+        }
+        let det = u + v + w;
+        let inv = V::constant(1.0) / det;
+        let (wu, wv, ww) = (u * inv, v * inv, w * inv);
+        let depth = wu.mul_add(az, wv.mul_add(bz, ww * cz));
+        let mut found = Candidate { hit: maybe, t: depth * packet.shear[2], u: wv, v: ww };
+        let size = det.abs();
+        let sound = V::constant(Self::least_det::<V::Scalar>()).cmp_le(size) & size.cmp_le(V::splat(V::Scalar::MAX));
+        let doubtful = (maybe & !sound).bits();
+        if doubtful != 0 {
+            found = Self::restart(packet, n, found, doubtful);
+        }
+        let own = Self::bounds(n);
+        let interval = Interval::of(packet, own.lo, own.hi);
+        found.t = packet.t_floor.fast_max(interval.clamp(found.t));
+        found.hit = found.hit & interval.near.cmp_le(interval.far) & packet.t_min.cmp_le(found.t);
+        Some(found)
+    }
+
+    /// Determinants below this may have lost bits to underflow.
+    #[inline(always)]
+    fn least_det<S: Real>() -> f64 {
+        S::MIN_POSITIVE.to_f64() / (S::EPSILON.to_f64() * S::EPSILON.to_f64())
+    }
+
+    /// Lanes whose edge functions under- or overflowed, one by one in f64 and scaled to unit size. Rare: tiny or
+    /// huge coordinates, and triangles seen exactly edge-on (which are misses).
+    #[cold]
+    #[inline(never)]
+    fn restart<V: Lanes>(packet: &Packet<V>, n: &[V::Scalar; 9], mut found: Candidate<V>, lanes: u32) -> Candidate<V> {
+        let mut hit = found.hit.bits() & !lanes;
+        for lane in 0..V::N {
+            if lanes >> lane & 1 == 0 {
+                continue;
+            }
+            let read = |v: [V; 3]| DVec3::from_array(v.map(|x| x.lane(lane).to_f64()));
+            let (org, dir) = (read(packet.org), read(packet.dir));
+            if let Some((t, u, v)) = edge_test_f64(org, dir, Self::corners(n)) {
+                let only = V::Mask::from_bits(1 << lane);
+                let put = |x: f64, old: V| V::select(only, V::constant(x), old);
+                (found.t, found.u, found.v) = (put(t, found.t), put(u, found.u), put(v, found.v));
+                hit |= 1 << lane;
+            }
+        }
+        found.hit = V::Mask::from_bits(hit);
+        found
+    }
+
+    /// Unnormalised geometric normal (right-handed over the corners' order), f64.
+    pub fn normal<S: Real>(numbers: &[S; 9]) -> DVec3 {
+        let [a, b, c] = Self::corners(numbers);
+        (b - a).cross(c - a)
+    }
+}
+
+/// The same test in f64 with the geometry scaled to unit size: `(t, u, v)` or a miss.
+fn edge_test_f64(org: DVec3, dir: DVec3, corners: [DVec3; 3]) -> Option<(f64, f64, f64)> {
+    let relative = corners.map(|p| p - org);
+    let largest = relative.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    let power = |x: f64| if x > 0.0 { x.log2().floor().clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+    let (length, speed) = (power(largest), power(dir.abs().max_element()));
+    let dir = dir / speed;
+    let size = dir.abs();
+    let k = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    let (kx, ky) = ((k + 1) % 3, (k + 2) % 3);
+    let [a, b, c] = relative.map(|p| {
+        let p = p / length;
+        (p[kx] - dir[kx] / dir[k] * p[k], p[ky] - dir[ky] / dir[k] * p[k], p[k])
+    });
+    let u = c.0 * b.1 - c.1 * b.0;
+    let v = a.0 * c.1 - a.1 * c.0;
+    let w = b.0 * a.1 - b.1 * a.0;
+    let det = u + v + w;
+    if (u.min(v).min(w) < 0.0 && u.max(v).max(w) > 0.0) || det == 0.0 {
+        return None;
+    }
+    let depth = (u * a.2 + v * b.2 + w * c.2) / det;
+    Some((depth / dir[k] * (length / speed), v / det, w / det))
+}

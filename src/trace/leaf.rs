@@ -1,0 +1,118 @@
+//! Leaves: one block of primitives against a packet.
+
+use super::query::Query;
+use crate::bvh::Child;
+use crate::lanes::Lanes;
+use crate::ray::{Packet, slab::Interval};
+use crate::scene::world::{Class, Object, World};
+use crate::shape::{Block, Cone, Cuboid, Cylinder, Disc, HalfSpace, Placed, Solid, Sphere, Triangle, WorldSphere};
+
+/// Tests the block a leaf refers to.
+#[inline(always)]
+pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
+    object: &Object<V::Scalar>,
+    inst: u32,
+    packet: &Packet<V>,
+    query: &mut Query<V, ANY, COUNT>,
+    leaf: Child,
+    lanes: u32,
+) {
+    let (at, count) = (leaf.index as usize, usize::from(leaf.count));
+    query.count_leaf(lanes, count);
+    match Class::ALL[usize::from(leaf.class)] {
+        Class::Triangle => triangles(&object.triangles[at], count, inst, packet, query, lanes),
+        Class::WorldSphere => spheres(&object.spheres[at], count, inst, packet, query, lanes),
+        class => {
+            let block = &object.placed[class as usize][at];
+            match class {
+                Class::Sphere => placed::<V, Sphere, ANY, COUNT>(block, count, inst, packet, query, lanes),
+                Class::Disc => placed::<V, Disc, ANY, COUNT>(block, count, inst, packet, query, lanes),
+                Class::Cuboid => placed::<V, Cuboid, ANY, COUNT>(block, count, inst, packet, query, lanes),
+                Class::Cylinder => placed::<V, Cylinder, ANY, COUNT>(block, count, inst, packet, query, lanes),
+                _ => placed::<V, Cone, ANY, COUNT>(block, count, inst, packet, query, lanes),
+            }
+        }
+    }
+}
+
+/// Tests an object's half-spaces, which no tree can hold.
+#[inline(always)]
+pub fn unbounded<V: Lanes, const ANY: bool, const COUNT: bool>(
+    object: &Object<V::Scalar>,
+    inst: u32,
+    packet: &Packet<V>,
+    query: &mut Query<V, ANY, COUNT>,
+    lanes: u32,
+) {
+    for block in &object.unbounded {
+        query.count_leaf(lanes, block.len());
+        placed::<V, HalfSpace, ANY, COUNT>(block, block.len(), inst, packet, query, lanes);
+    }
+}
+
+/// Takes a packet into an instance: the lanes that meet the instance's box, and the packet in its space.
+#[inline(always)]
+pub fn enter<V: Lanes, const ANY: bool, const COUNT: bool>(
+    world: &World<V::Scalar>,
+    inst: u32,
+    packet: &Packet<V>,
+    query: &Query<V, ANY, COUNT>,
+    lanes: u32,
+) -> (Packet<V>, u32) {
+    let instance = &world.instances[inst as usize];
+    if instance.identity {
+        return (*packet, lanes);
+    }
+    let interval = Interval::of(packet, instance.bounds.lo, instance.bounds.hi);
+    let meets = crate::lanes::LaneMask::bits(interval.meets(packet.t_min, query.hit.t));
+    (packet.into_local(&instance.to_local, interval.near), lanes & meets)
+}
+
+#[inline(always)]
+fn triangles<V: Lanes, const ANY: bool, const COUNT: bool>(
+    block: &Block<V::Scalar, 9>,
+    count: usize,
+    inst: u32,
+    packet: &Packet<V>,
+    query: &mut Query<V, ANY, COUNT>,
+    lanes: u32,
+) {
+    for i in 0..count {
+        let prim = block.prim[i];
+        Triangle::intersect(packet, &block.get(i), lanes, |found, lanes| query.take(lanes, found, prim, inst));
+    }
+}
+
+#[inline(always)]
+fn spheres<V: Lanes, const ANY: bool, const COUNT: bool>(
+    block: &Block<V::Scalar, 4>,
+    count: usize,
+    inst: u32,
+    packet: &Packet<V>,
+    query: &mut Query<V, ANY, COUNT>,
+    lanes: u32,
+) {
+    for i in 0..count {
+        let numbers = block.get(i);
+        let span = WorldSphere::span(packet.org, packet.dir, &numbers);
+        let found = span.nearest(packet, &WorldSphere::bounds(&numbers));
+        query.take(lanes, &found, block.prim[i], inst);
+    }
+}
+
+#[inline(always)]
+fn placed<V: Lanes, K: Solid, const ANY: bool, const COUNT: bool>(
+    block: &Block<V::Scalar, 19>,
+    count: usize,
+    inst: u32,
+    packet: &Packet<V>,
+    query: &mut Query<V, ANY, COUNT>,
+    lanes: u32,
+) {
+    for i in 0..count {
+        let numbers = block.get(i);
+        let span = Placed::span::<V, K>(packet, &numbers);
+        let found = span.nearest(packet, &Placed::bounds(&numbers));
+        query.take(lanes, &found, block.prim[i], inst);
+    }
+}

@@ -1,0 +1,76 @@
+//! All generic engines give the same bits: brute force and tree, every width, any-hit and closest-hit.
+
+mod common;
+
+use lanecast::ray::{Counters, Hits};
+use lanecast::scene::world::{Preset, World};
+use lanecast::trace::{Engines, Scratch};
+
+fn same_bits<S: Engines>(world: &World<S>, seed: u64, n: usize) -> usize {
+    let rays = common::rays::<S>(n, seed);
+    let mut scratch = Scratch::default();
+    let (mut want, mut got) = (Hits::<S>::default(), Hits::<S>::default());
+    let (mut any_want, mut any) = (Vec::new(), Vec::new());
+    let engines = S::engines();
+    engines[0].intersect(world, &rays, &mut want, &mut scratch, None);
+    engines[0].occluded(world, &rays, &mut any_want, &mut scratch, None);
+    for i in 0..n {
+        assert_eq!(any_want[i] == 1, want.is_hit(i), "any-hit and closest-hit differ on ray {i}");
+        if want.is_hit(i) {
+            assert!(rays.is_live(i) && rays.t_min[i] <= want.t[i] && want.t[i] <= rays.t_max[i]);
+        } else {
+            assert_eq!(want.t[i].to_f64(), f64::INFINITY);
+        }
+    }
+    for engine in engines {
+        for count in [false, true] {
+            let mut counters = Counters::default();
+            engine.intersect(world, &rays, &mut got, &mut scratch, count.then_some(&mut counters));
+            for i in 0..n {
+                let bits = |h: &Hits<S>| {
+                    let exact = [h.t[i], h.u[i], h.v[i]].map(|x| x.to_f64().to_bits());
+                    (exact, h.prim[i], h.inst[i])
+                };
+                assert_eq!(bits(&got), bits(&want), "{} ray {i} count {count}", engine.name());
+            }
+            assert_eq!(counters.rays, if count { rays.live_count() as u64 } else { 0 });
+            engine.occluded(world, &rays, &mut any, &mut scratch, None);
+            assert_eq!(any, any_want, "{} any-hit", engine.name());
+        }
+    }
+    want.hit_count()
+}
+
+fn all_worlds<S: Engines>() {
+    for seed in 0..6 {
+        for instances in [false, true] {
+            for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
+                let world = World::<S>::compile(&common::zoo(seed, instances), preset).unwrap();
+                let hits = same_bits(&world, 100 + seed, 2000);
+                assert!(hits > 800, "only {hits} rays hit");
+            }
+        }
+    }
+}
+
+#[test]
+fn f32_engines_agree() {
+    all_worlds::<f32>();
+}
+
+#[test]
+fn f64_engines_agree() {
+    all_worlds::<f64>();
+}
+
+#[test]
+fn every_batch_length_and_an_empty_world() {
+    let world = World::<f32>::compile(&common::zoo(3, true), Preset::Balanced).unwrap();
+    for n in (0..40).chain([255, 256, 257]) {
+        same_bits(&world, n as u64, n);
+    }
+    let nothing = lanecast::scene::description::Description::new("nothing");
+    let world = World::<f64>::compile(&nothing, Preset::Balanced).unwrap();
+    assert_eq!(same_bits(&world, 1, 50), 0);
+    assert!(world.bounds().is_none());
+}
