@@ -87,6 +87,31 @@ fn the_seed_changes_samples_but_not_single_sample_pictures() {
     assert!(picture(2, 1) != picture(2, 2));
 }
 
+/// Every generic engine, packets of all widths included, gives the picture of `scalar`. (`tile` and `auto` may compute
+/// in a frame of their own and are judged by `verify`.)
+fn engines_agree<S: Engines>() {
+    let d = scene();
+    let world = World::<S>::compile(&d, Preset::Balanced).unwrap();
+    let camera = Camera::new(&framing(world.bounds(), 1.5), 1.5).unwrap();
+    let picture = |name: &str| {
+        let aovs = vec![Aov::Z, Aov::Normal, Aov::Instance, Aov::Primitive];
+        let options = RenderOptions { engine: name.into(), aovs, ..options() };
+        bits(&render(&world, &d, &camera, &options, &Silent).unwrap())
+    };
+    let want = picture("scalar");
+    let names: Vec<&str> = S::engines().iter().map(|e| e.name()).filter(|n| !["tile", "auto"].contains(n)).collect();
+    assert!(names.len() >= 3, "{names:?}");
+    for name in names {
+        assert!(picture(name) == want, "{name}");
+    }
+}
+
+#[test]
+fn engines_agree_on_every_bit() {
+    engines_agree::<f32>();
+    engines_agree::<f64>();
+}
+
 /// Stops after some tiles.
 struct StopAfter {
     left: AtomicU64,
