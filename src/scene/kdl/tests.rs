@@ -1,0 +1,1 @@
+//! Tests of the scene format as a whole.
