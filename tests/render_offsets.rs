@@ -5,7 +5,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 use lanecast::camera::{Camera, framing};
 use lanecast::film::PlaneData;
 use lanecast::render::{RenderOptions, Silent, render};
-use lanecast::scene::description::{Description, Group, Item, ItemKind, Shape};
+use lanecast::scene::description::{CameraDescription, Description, Group, Item, ItemKind, Projection, Shape};
 use lanecast::scene::mesh::Mesh;
 use lanecast::scene::world::{Preset, World};
 use lanecast::shade::Integrator;
@@ -16,9 +16,9 @@ fn item(transform: DAffine3, kind: ItemKind) -> Item {
 }
 
 /// Share of the hit pixels that are not fully open, and the number of hit pixels.
-fn leaks<S: Engines>(description: &Description) -> (f64, usize) {
+fn leaks<S: Engines>(description: &Description, camera: Option<CameraDescription>) -> (f64, usize) {
     let world = World::<S>::compile(description, Preset::Balanced).unwrap();
-    let camera = Camera::new(&framing(world.bounds(), 1.0), 1.0).unwrap();
+    let camera = Camera::new(&camera.unwrap_or_else(|| framing(world.bounds(), 1.0)), 1.0).unwrap();
     let options = RenderOptions {
         width: 96,
         height: 96,
@@ -88,7 +88,7 @@ fn all_open<S: Engines>() {
                 } else {
                     d.groups[0].items.push(item(place, kind.clone()));
                 }
-                let (leaks, pixels) = leaks::<S>(&d);
+                let (leaks, pixels) = leaks::<S>(&d, None);
                 let what = if matches!(kind, ItemKind::Mesh(_)) { "mesh".into() } else { format!("{kind:?}") };
                 assert!(pixels > 500, "{what} {name}: only {pixels} pixels");
                 assert!(leaks == 0.0, "{what} {name}, instanced {instanced}: {leaks} of {pixels} pixels");
@@ -105,4 +105,30 @@ fn convex_bodies_are_open_in_f32() {
 #[test]
 fn convex_bodies_are_open_in_f64() {
     all_open::<f64>();
+}
+
+/// A tilted square much larger than its distance from the eye: its corners' rounding errors are what counts.
+fn large_squares_are_open<S: Engines>() {
+    for turn in 0..4 {
+        let k = f64::from(turn);
+        let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 0.3 + k, 1.1 - 0.3 * k, 0.1 * k - 0.7));
+        for (size, height) in [(1.0, 1.0), (10.0, 0.1), (100.0, 1.0), (1e4, 10.0), (1e6, 1.0)] {
+            let corner = |x: f64, y: f64| turn * DVec3::new(x * size, y * size, 0.0);
+            let positions = vec![corner(-1.0, -1.1), corner(1.3, -1.0), corner(1.0, 1.0), corner(-1.0, 1.2)];
+            let mut d = Description::new("square");
+            d.meshes.push(Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], groups: Vec::new() }.into());
+            d.groups[0].items.push(item(DAffine3::IDENTITY, ItemKind::Mesh(0)));
+            let (eye, look_at) = (turn * DVec3::new(0.3, 0.2, height), turn * DVec3::new(0.35, 0.1, 0.0));
+            let projection = Projection::Perspective { theta: 1.0 };
+            let camera = CameraDescription { name: "near".into(), eye, look_at, up: DVec3::Y, projection };
+            let (leaks, pixels) = leaks::<S>(&d, Some(camera));
+            assert!(pixels > 500 && leaks == 0.0, "size {size} height {height}: {leaks} of {pixels} pixels");
+        }
+    }
+}
+
+#[test]
+fn large_squares_are_open_from_near() {
+    large_squares_are_open::<f32>();
+    large_squares_are_open::<f64>();
 }

@@ -8,8 +8,9 @@ use crate::shade::{Integrator, Settings};
 
 /// Most pixels of a film (a film of 12 planes then takes 12 GiB).
 const MAX_PIXELS: u64 = 1 << 28;
-/// Most samples per pixel, occlusion rays per hit, mirrors per path: beyond, a slip of the keyboard.
+/// Most samples per pixel and occlusion rays per hit; more is a slip of the keyboard.
 const MAX_SAMPLES: u32 = 1 << 20;
+/// Most mirrors of a path.
 const MAX_DEPTH: u32 = 1 << 10;
 
 /// What to render. Precision is the type parameter of [`super::render`], threads are those of the current rayon
@@ -72,13 +73,13 @@ impl RenderOptions {
     pub fn check(&self) -> Result<(Tiling, Window)> {
         let fail = |what: String| Err(Error::Usage(what));
         let tiling = Tiling::new(self.width, self.height, self.tile)?;
-        let window = self.crop.unwrap_or(Window { x0: 0, y0: 0, x1: self.width, y1: self.height });
+        let window = self.crop.unwrap_or(Window::full(self.width, self.height));
         let Window { x0, y0, x1, y1 } = window;
         if x0 >= x1 || y0 >= y1 || x1 > self.width || y1 > self.height {
             let (width, height) = (self.width, self.height);
             return fail(format!("crop {x0},{y0},{x1},{y1} is empty or leaves the picture of {width}x{height}"));
         }
-        if u64::from(x1 - x0) * u64::from(y1 - y0) > MAX_PIXELS {
+        if window.area() > MAX_PIXELS {
             return fail(format!("more than {MAX_PIXELS} pixels in one film; render crops"));
         }
         if self.spp == 0 || self.spp > MAX_SAMPLES {

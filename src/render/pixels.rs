@@ -41,7 +41,7 @@ pub(super) struct Painter {
 impl Painter {
     /// A film of misses in a black world.
     pub fn new(width: u32, height: u32, window: Window, aovs: &[Aov]) -> Self {
-        let area = (window.x1 - window.x0) as usize * (window.y1 - window.y0) as usize;
+        let area = window.area() as usize;
         let extra = Aov::ALL.into_iter().filter(|aov| aovs.contains(aov)).flat_map(Aov::channels);
         let channels: Vec<Channel> = COLOR.iter().chain(extra).copied().collect();
         let planes = channels
@@ -57,10 +57,9 @@ impl Painter {
         Self { channels, film: Film { width, height, window, planes } }
     }
 
-    /// Sets pixel (x, y), which must lie in the film's window.
+    /// Sets pixel (x, y) if it lies in the film's window.
     pub fn put(&mut self, x: u32, y: u32, pixel: &Sample) {
-        let window = self.film.window;
-        let index = (y - window.y0) as usize * (window.x1 - window.x0) as usize + (x - window.x0) as usize;
+        let Some(index) = self.film.window.index(x, y) else { return };
         for (channel, plane) in self.channels.iter().zip(&mut self.film.planes) {
             match (channel.get, &mut plane.data) {
                 (Get::F32(get), PlaneData::F32(data)) => data[index] = get(pixel) as f32,

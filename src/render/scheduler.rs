@@ -178,8 +178,7 @@ impl<S: Real> Job<'_, S> {
 
     /// Puts the finished tile's pixels into the film.
     fn paint(&self, memory: &TileMemory<S>, painter: &mut Painter) {
-        let inside = |&&(x, y): &&(u32, u32)| self.rect.contains(x, y);
-        for (i, &(x, y)) in memory.pixels.iter().enumerate().filter(|(_, pixel)| inside(pixel)) {
+        for (i, &(x, y)) in memory.pixels.iter().enumerate() {
             painter.put(x, y, &mean(&memory.sums[i], self.options.spp));
         }
     }

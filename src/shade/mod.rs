@@ -5,6 +5,7 @@
 //! in an order that depends on the path alone, so a pixel's value does not depend on what else is in its batch.
 
 mod ambient_occlusion;
+mod extent;
 mod integrator;
 mod lights;
 mod offset;

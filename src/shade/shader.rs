@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::extent::magnitude;
 use super::integrator::Integrator;
 use super::offset::{offset_origin, position_error};
 use crate::lanes::Real;
@@ -273,7 +274,8 @@ impl<'a, S: Real> Shader<'a, S> {
         let facing = if surface.ng.dot(dir) > 0.0 { -surface.ng } else { surface.ng };
         // A triangle too thin for a normal is seen face on.
         let normal = if facing.is_finite() { facing } else { -dir.normalize_or_zero() };
-        let error = position_error::<S>(org, dir, t, surface.position);
+        let magnitude = magnitude(&self.world.assembly, hits.prim[i], hits.inst[i]);
+        let error = position_error::<S>(org, dir, t, surface.position, magnitude);
         Vertex { path, position: surface.position, error, normal, dir, material: surface.material, throughput }
     }
 
