@@ -8,6 +8,7 @@ mod info;
 mod interrupt;
 mod isa;
 mod rays;
+mod render;
 mod trace;
 mod verify;
 
@@ -25,6 +26,7 @@ const BAD_USAGE: u8 = 2;
 
 const EXAMPLES: &str = "\
 Examples:
+  lanecast render builtin:sphere-flake -o flake.png    what it looks like
   lanecast info builtin:sphere-flake                   what is in a scene
   lanecast bench                                       how fast, on small built-in scenes
   lanecast bench model.ply --rays primary,shadow       how fast, on a model of yours
@@ -45,6 +47,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Render a picture: EXR, PNG or NPY
+    Render(render::RenderArgs),
     /// Measure engines on ray classes: million rays per second, checked before timed
     Bench(bench::BenchArgs),
     /// Trace a file of rays and time it
@@ -83,6 +87,7 @@ pub fn main() -> ExitCode {
 
 fn run(command: &Command) -> Result<()> {
     let output = match command {
+        Command::Render(args) => &args.output,
         Command::Bench(args) => &args.output,
         Command::Trace(args) => &args.output,
         Command::Rays(args) => &args.output,
@@ -93,6 +98,7 @@ fn run(command: &Command) -> Result<()> {
         output.detail(&hint);
     }
     match command {
+        Command::Render(args) => render::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Rays(args) => rays::run(args),
