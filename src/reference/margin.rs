@@ -137,7 +137,9 @@ impl Located<'_> {
             return false;
         }
         let (solid, to_local) = match &self.geometry {
-            Geometry::Triangle(corners) => return point_to_triangle(ray.at(t), *corners) <= delta,
+            Geometry::Triangle(corners) => {
+                return point_to_triangle(ray.at(t), *corners) <= delta || passes_edge_on(ray, t, *corners, delta);
+            }
             Geometry::Solid(solid, to_local) => (solid, to_local),
         };
         let orders = order.map_or(0..2, |k| k..k + 1);
@@ -157,13 +159,25 @@ impl Located<'_> {
 
     /// Range of t over which displaced rays cross a solid for the `order`-th time, give or take `delta`. The solids
     /// are convex and crossings move continuously with the ray, so each t in between belongs to some displaced ray.
+    /// If one of the rays misses, both crossings meet on the way to it, near the middle of the shortest chord.
     fn reach(&self, ray: &OracleRay, order: usize, delta: f64) -> Option<(f64, f64)> {
         let along = delta / ray.dir.length();
-        let ts = self.displaced(ray, delta).filter_map(|r| self.crossings(&r)[order].map(|c| c.t));
-        ts.fold(None, |range: Option<(f64, f64)>, t| {
-            let (lo, hi) = range.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
-            Some((lo.min(t - along), hi.max(t + along)))
-        })
+        let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
+        let (mut missed, mut shortest) = (false, None);
+        for found in self.displaced(ray, delta).map(|r| self.crossings(&r)) {
+            match found[order] {
+                Some(c) => (lo, hi) = (lo.min(c.t), hi.max(c.t)),
+                None => missed = true,
+            }
+            if let [Some(enter), Some(leave)] = found {
+                let chord = (leave.t - enter.t, 0.5 * enter.t + 0.5 * leave.t);
+                shortest = Some(shortest.map_or(chord, |s: (f64, f64)| if chord.0 < s.0 { chord } else { s }));
+            }
+        }
+        if let (true, Some((_, middle))) = (missed, shortest) {
+            (lo, hi) = (lo.min(middle), hi.max(middle));
+        }
+        (lo <= hi).then_some((lo - along, hi + along))
     }
 
     /// Whether some ray displaced by at most `delta` sees `face` of a solid where the ray is at `t`.
@@ -249,6 +263,24 @@ impl Placed {
     }
 }
 
+/// Corners moved by delta give a triangle that the ray sees thinner than delta any crossing along its depth.
+fn passes_edge_on(ray: &OracleRay, t: f64, corners: [DVec3; 3], delta: f64) -> bool {
+    let ng = shapes::cross(corners[1] - corners[0], corners[2] - corners[0]);
+    let length = ray.dir.length();
+    let longest = edges(corners).map(|(a, b)| (b - a).reject_from(ray.dir).length()).into_iter().fold(0.0, f64::max);
+    let (lo, hi) = depth_range(ray, corners);
+    let along = delta / length;
+    let line = OracleRay { t_min: f64::NEG_INFINITY, t_max: f64::INFINITY, ..*ray };
+    let thin = ng.dot(ray.dir).abs() / length <= delta * longest;
+    thin && lo - along <= t && t <= hi + along && segment_to_triangle(&line, corners) <= delta
+}
+
+/// Range of t of the points of the ray nearest to the points of a triangle.
+fn depth_range(ray: &OracleRay, corners: [DVec3; 3]) -> (f64, f64) {
+    let ts = corners.map(|p| (p - ray.org).dot(ray.dir) / ray.dir.dot(ray.dir));
+    ts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), &t| (lo.min(t), hi.max(t)))
+}
+
 fn point_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
     let ab = b - a;
     let s = ((p - a).dot(ab) / ab.dot(ab)).clamp(0.0, 1.0);
@@ -286,8 +318,7 @@ fn segment_to_triangle(ray: &OracleRay, corners: [DVec3; 3]) -> f64 {
         return 0.0;
     }
     // The nearest point of the segment lies beside the triangle.
-    let ts = corners.map(|p| (p - ray.org).dot(ray.dir) / ray.dir.dot(ray.dir));
-    let (lo, hi) = ts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), &t| (lo.min(t), hi.max(t)));
+    let (lo, hi) = depth_range(ray, corners);
     let segment = (ray.at(lo.clamp(ray.t_min, ray.t_max)), ray.at(hi.clamp(ray.t_min, ray.t_max)));
     let rim = edges(corners).map(|edge| segment_to_segment(segment, edge)).into_iter().fold(f64::INFINITY, f64::min);
     rim.min(point_to_triangle(segment.0, corners)).min(point_to_triangle(segment.1, corners))

@@ -23,7 +23,7 @@
 //! answer is *explained* if rays displaced sideways by at most delta justify it, *unexplained* if not:
 //!
 //! 1. **What was reported is there.** The point of the ray at the engine's t lies within delta of the reported
-//!    triangle; or, for an analytic shape, the engine's t (give or take delta) is between the crossings of displaced
+//!    triangle (anywhere along its depth, if the ray sees it thinner than delta); or, for an analytic shape, the engine's t (give or take delta) is between the crossings of displaced
 //!    rays with it. t is inside the segment, u and v fit.
 //! 2. **What was skipped can be missed.** Every crossing of the true ray before the engine's t (or in the whole
 //!    segment, if the engine reports a miss) is one of these: its surface also passes the engine's point within delta
