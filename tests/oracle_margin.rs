@@ -39,9 +39,12 @@ fn triangle(corners: [Vec3; 3], org: Vec3, dir: Vec3) -> Found {
 }
 
 fn sphere(org: Vec3, dir: Vec3) -> [Found; 2] {
+    // Twice: in the space of a flat ellipsoid the origin is so far away that one shift misses the nearest point.
     let a = dir.dot(dir);
-    let shift = -org.dot(dir) / a;
-    let nearest = org + shift * dir;
+    let first = -org.dot(dir) / a;
+    let near = org + first * dir;
+    let second = -near.dot(dir) / a;
+    let (shift, nearest) = (first + second, near + second * dir);
     let disc = 1.0 - nearest.dot(nearest);
     if disc < 0.0 {
         return [None; 2];
@@ -205,13 +208,50 @@ fn the_margin_factor_suffices_for_textbook_kernels_with_room_to_spare() {
     let mut random = Random(7);
     for scene in scenes(&mut random) {
         for from in [1.5, 100.0, 10_000.0] {
-            let rays = rays(&mut random, &scene, from, 3000);
+            let rays = rays(&mut random, &scene, from, 1500);
             let judged = |k| tally(&scene.assembly, &rays, k);
-            let counts = [0.5, 1.0, 2.0, 4.0, 8.0].map(|k| (k, judged(k).unexplained));
+            let counts = [1.0, 2.0, 4.0].map(|k| (k, judged(k).unexplained));
             let (full, name) = (judged(MARGIN_FACTOR), &scene.name);
             println!("{name} from {from}: unexplained at K {counts:?}; at {MARGIN_FACTOR}: {full}");
             assert!(full.is_clean(), "{name} from {from}: {full}");
-            assert!(full.hits > 100, "{name} from {from}: {full}");
+            assert!(full.hits > 80, "{name} from {from}: {full}");
         }
     }
+}
+
+#[test]
+fn f64_answers_of_another_formula_are_clean() {
+    // Edge functions as volumes over the ray, in world space: nothing in common with the oracle but the input. Its
+    // plain cross product loses the plane of slivers, so the instance is stretched mildly.
+    let kernel = |corners: [DVec3; 3], ray: &OracleRay| {
+        let [a, b, c] = corners.map(|p| p - ray.org);
+        let (u, v, w) = (ray.dir.dot(c.cross(b - c)), ray.dir.dot(a.cross(c - a)), ray.dir.dot(b.cross(a - b)));
+        let sum = u + v + w;
+        let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+        let ng = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        (inside && sum != 0.0).then(|| (a.dot(ng) / ray.dir.dot(ng), v / sum, w / sum))
+    };
+    let mut random = Random(8);
+    let mesh = soup(&mut random, 300, 0.4);
+    let turn = DQuat::from_scaled_axis(DVec3::new(0.3, -1.1, 0.7));
+    let to_world = DAffine3::from_scale_rotation_translation(DVec3::new(1.0, 3.0, 0.5), turn, DVec3::splat(5.0));
+    let instance = Item { transform: to_world, material: None, kind: ItemKind::Instance(1) };
+    let item = Item { transform: DAffine3::IDENTITY, material: None, kind: ItemKind::Mesh(0) };
+    let oracle = Oracle::new(&assembly(vec![mesh.clone()], vec![vec![instance], vec![item]]));
+    let mut tally = Tally::default();
+    for i in 0..3000u32 {
+        let org = DVec3::splat(5.0) + 40.0 * 10f64.powi(i as i32 % 4) * random.vector().normalize();
+        let target = mesh.corners(random.bits() as usize % 300).map(|p| to_world.transform_point3(p));
+        let dir = (target[0] + target[1] + target[2]) / 3.0 - org;
+        let ray = OracleRay { org, dir, t_min: 0.0, t_max: f64::INFINITY };
+        let hits = (0..300).filter_map(|prim| {
+            let corners = mesh.corners(prim).map(|p| to_world.transform_point3(p));
+            let (t, u, v) = kernel(corners, &ray).filter(|h| h.0 >= 0.0)?;
+            Some(EngineHit { t, u, v, prim: prim as u32, inst: 0 })
+        });
+        let answer = hits.min_by(|a, b| a.t.total_cmp(&b.t));
+        tally.add(answer.is_some(), &oracle.judge(&ray, answer, Precision::F64));
+    }
+    println!("f64: {tally}");
+    assert!(tally.is_clean() && tally.hits > 2900, "{tally}");
 }
