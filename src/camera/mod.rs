@@ -1,1 +1,13 @@
-//! Cameras, tiles and ray generation. (being built)
+//! Cameras, the order of pixels in tiles, primary rays and the random numbers that place samples.
+
+mod framing;
+mod generate;
+mod matrices;
+mod model;
+pub mod sampling;
+mod tiles;
+
+pub use framing::framing;
+pub use generate::{SubPixel, fill_tile};
+pub use model::{Camera, CameraOverrides};
+pub use tiles::{FILE_TILE, PixelRect, Tiling, morton_decode, morton_encode};

@@ -81,6 +81,25 @@ pub trait Lanes:
     /// `self == other`, false for NaN.
     fn cmp_eq(self, other: Self) -> Self::Mask;
 
+    /// Smallest and largest value of the lanes in `mask` (not empty, no NaN).
+    #[inline(always)]
+    fn range(self, mask: u32) -> (Self::Scalar, Self::Scalar) {
+        let set = Self::Mask::from_bits(mask);
+        let mut low = [Self::Scalar::INFINITY; MAX_LANES];
+        let mut high = [Self::Scalar::LOWEST; MAX_LANES];
+        Self::select(set, self, Self::splat(Self::Scalar::INFINITY)).store(&mut low);
+        Self::select(set, self, Self::splat(Self::Scalar::LOWEST)).store(&mut high);
+        let mut half = Self::N / 2;
+        while half > 0 {
+            for i in 0..half {
+                low[i] = low[i].fast_min(low[i + half]);
+                high[i] = high[i].fast_max(high[i + half]);
+            }
+            half /= 2;
+        }
+        (low[0], high[0])
+    }
+
     /// `self > other`, false for NaN.
     #[inline(always)]
     fn cmp_gt(self, other: Self) -> Self::Mask {
@@ -102,6 +121,8 @@ pub trait Lanes:
 pub trait Real:
     Lanes<Scalar = Self, Mask = bool> + PartialOrd + Default + Send + Sync + bytemuck::Pod + 'static
 {
+    /// Eight lanes of this scalar: what an 8-wide node is tested with.
+    type Octo: Lanes<Scalar = Self>;
     /// Half the distance from 1 to the next larger number.
     const EPSILON: Self;
     /// Smallest positive normal number.

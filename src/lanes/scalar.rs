@@ -18,7 +18,7 @@ impl LaneMask for bool {
 }
 
 macro_rules! scalar_lanes {
-    ($t:ident) => {
+    ($t:ident, $octo:ident) => {
         impl Lanes for $t {
             type Scalar = $t;
             type Mask = bool;
@@ -85,6 +85,7 @@ macro_rules! scalar_lanes {
         }
 
         impl Real for $t {
+            type Octo = super::$octo;
             const EPSILON: Self = $t::EPSILON / 2.0;
             const MIN_POSITIVE: Self = $t::MIN_POSITIVE;
             const MAX: Self = $t::MAX;
@@ -114,5 +115,5 @@ macro_rules! scalar_lanes {
     };
 }
 
-scalar_lanes!(f32);
-scalar_lanes!(f64);
+scalar_lanes!(f32, f32x8);
+scalar_lanes!(f64, f64x8);

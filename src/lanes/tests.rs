@@ -55,6 +55,15 @@ fn check_width<V: Lanes>() {
             }
         }
     }
+    let numbers: Vec<V::Scalar> =
+        (0..V::N).map(|i| V::Scalar::from_f64(f64::from((i * 7 % 16) as u32) - 6.0)).collect();
+    for mask in 1..=V::ALL.min(0xfff) {
+        let of = |pick: fn(V::Scalar, V::Scalar) -> V::Scalar| {
+            (0..V::N).filter(|i| mask >> i & 1 != 0).map(|i| numbers[i]).reduce(pick).unwrap()
+        };
+        let want = (of(|a, b| if b < a { b } else { a }), of(|a, b| if b > a { b } else { a }));
+        assert!(V::load(&numbers).range(mask) == want, "mask {mask:b}");
+    }
     for bits in [0, 1, V::ALL, V::ALL & 0x5555, V::ALL & 0xaaaa, V::ALL >> 1] {
         assert_eq!(V::Mask::from_bits(bits).bits(), bits);
         assert_eq!((V::Mask::from_bits(bits) & V::Mask::from_bits(3)).bits(), bits & 3 & V::ALL);

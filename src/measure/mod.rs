@@ -1,1 +1,15 @@
-//! (being built)
+//! Measuring: ray sets, timing, statistics, checks before the clock starts, verification against the oracle, rows.
+
+pub mod answers;
+pub mod bench;
+pub mod env;
+pub mod eye;
+pub mod raysets;
+pub mod rows;
+pub mod stats;
+pub mod timing;
+pub mod truth;
+pub mod verify;
+
+#[cfg(test)]
+mod testing;

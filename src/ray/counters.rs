@@ -6,9 +6,9 @@
 pub struct Counters {
     /// Rays traced (live ones).
     pub rays: u64,
-    /// Inner nodes visited by packets (or single rays).
+    /// Inner nodes visited by packets (or single rays); each visit tests eight boxes against the packet's bounds.
     pub nodes: u64,
-    /// Box tests (one child against one packet).
+    /// Tests of one box against all lanes of a packet, after the packet's bounds met it.
     pub boxes: u64,
     /// Leaves visited.
     pub leaves: u64,

@@ -46,7 +46,9 @@ impl<V: Lanes> Interval<V> {
     /// Lanes whose segment `t_min..=t_max` meets the box.
     #[inline(always)]
     pub fn meets(&self, t_min: V, t_max: V) -> V::Mask {
-        self.near.fast_max(t_min).cmp_le(self.far.fast_min(t_max))
+        // The far side second: a box behind everything has far = -inf, which the padding turns into NaN, and NaN
+        // must come through and miss.
+        self.near.fast_max(t_min).cmp_le(t_max.fast_min(self.far))
     }
 
     /// `t` moved into the interval: how a primitive's hit is made consistent with its own box.

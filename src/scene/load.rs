@@ -1,7 +1,21 @@
-//! Opening a scene by what the user typed: a file (by extension) or `builtin:NAME`. (being built)
+//! Opening a scene by what the user typed: a file (by extension) or `builtin:NAME`.
 
-use super::description::Description;
-use crate::error::Result;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::DAffine3;
+use sha2::{Digest, Sha256};
+
+use super::description::{Description, Item, ItemKind};
+use super::kdl::meshes::{MeshFile, MeshFiles, add_mesh_materials};
+use super::mesh::Mesh;
+use super::{builtin, kdl, obj, ply, stl, unpack};
+use crate::error::{Error, Result, nearest_name};
+
+/// Extensions that [`load`] reads; meshes may also be packed (`.ply.gz`, `.obj.zst`).
+pub const EXTENSIONS: [&str; 4] = ["kdl", "obj", "ply", "stl"];
 
 /// How to open a scene.
 #[derive(Clone, Debug, Default)]
@@ -17,6 +31,75 @@ pub struct LoadOptions {
 /// # Errors
 /// Unknown built-in names and extensions, unreadable or malformed files, unknown `--set` names.
 pub fn load(scene: &str, options: &LoadOptions) -> Result<Description> {
-    let _ = (scene, options);
-    unimplemented!()
+    if let Some(name) = scene.strip_prefix("builtin:") {
+        return builtin::load(name, &options.set);
+    }
+    let path = Path::new(scene);
+    let mut description = match extension(path)?.as_str() {
+        "kdl" => scene_file(path, options)?,
+        _ => mesh_scene(path, options)?,
+    };
+    description.source = Some(path.to_path_buf());
+    Ok(description)
+}
+
+fn scene_file(path: &Path, options: &LoadOptions) -> Result<Description> {
+    let mut bytes = Vec::new();
+    // One byte over the limit is enough for the parser to refuse the file, whatever its size.
+    let file = File::open(path).map_err(|e| Error::io(path, e))?;
+    file.take(kdl::MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, e))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let files = MeshFiles { folder: Some(folder), allow_outside: options.allow_outside, read: &read_mesh };
+    kdl::parse(path, &stem(path), &bytes, &options.set, &files)
+}
+
+/// A scene of one mesh, which has no parameters to set.
+fn mesh_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
+    if let Some((name, _)) = options.set.first() {
+        return Err(Error::Usage(format!("--set {name}: {} has no parameters", path.display())));
+    }
+    let MeshFile { mesh, digest } = read_mesh(path)?;
+    let mut description = Description::new(stem(path));
+    description.hash = digest.iter().map(|b| format!("{b:02x}")).collect();
+    description.meshes.push(Arc::new(mesh));
+    description.groups[0].items.push(Item { transform: DAffine3::IDENTITY, material: None, kind: ItemKind::Mesh(0) });
+    add_mesh_materials(&mut description);
+    Ok(description)
+}
+
+/// Reads the mesh in `path`, told by its extension.
+///
+/// # Errors
+/// Unknown extensions, unreadable or malformed files.
+pub fn read_mesh(path: &Path) -> Result<MeshFile> {
+    let parse: fn(&Path, &[u8]) -> Result<Mesh> = match unpack::inner_extension(path).unwrap_or_default().as_str() {
+        "obj" => |path, bytes| obj::parse(path, bytes).map(|file| file.mesh),
+        "ply" => ply::parse,
+        "stl" => stl::parse,
+        _ => return Err(Error::whole(path, "expected a mesh file: .obj, .ply or .stl")),
+    };
+    let bytes = unpack::read_file(path)?;
+    Ok(MeshFile { mesh: parse(path, &bytes)?, digest: Sha256::digest(&bytes).into() })
+}
+
+/// The known extension of `path`, lower case, without the packing's.
+fn extension(path: &Path) -> Result<String> {
+    let inner = unpack::inner_extension(path).unwrap_or_default();
+    if EXTENSIONS.contains(&inner.as_str()) {
+        return Ok(inner);
+    }
+    let all: Vec<String> = EXTENSIONS.iter().map(|e| format!(".{e}")).collect();
+    let what = format!("expected a scene ({}, meshes also .gz or .zst) or builtin:NAME", all.join(" "));
+    let error = Error::whole(path, what);
+    Err(match nearest_name(&inner, EXTENSIONS).or(nearest_name(&path.to_string_lossy(), builtin::NAMES)) {
+        Some(near) if builtin::NAMES.contains(&near) => error.with_help(format!("did you mean `builtin:{near}`?")),
+        Some(near) => error.with_help(format!("did you mean `.{near}`?")),
+        None => error,
+    })
+}
+
+/// The file's name up to its first dot.
+fn stem(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.trim_start_matches('.').split('.').next().unwrap_or_default().to_string()
 }

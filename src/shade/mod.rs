@@ -1,1 +1,19 @@
-//! (being built)
+//! Materials, lights and integrators: what colour a batch of rays sees.
+//!
+//! Integrators work on whole batches, never ray by ray: primary hits give a compact batch of shadow rays per light,
+//! then a compact batch of mirror rays, which is the next level's batch. Lighting itself is f64, one hit at a time,
+//! in an order that depends on the path alone, so a pixel's value does not depend on what else is in its batch.
+
+mod ambient_occlusion;
+mod extent;
+mod integrator;
+mod lights;
+mod offset;
+mod shader;
+mod views;
+mod whitted;
+
+pub use integrator::Integrator;
+pub use lights::headlight;
+pub use offset::{offset_origin, position_error};
+pub use shader::{RayCounts, Sample, Settings, Shader, Workspace};

@@ -14,7 +14,8 @@
 
 use glam::DVec3;
 
-use crate::lanes::{LaneMask, Lanes, Real};
+use super::block::{BLOCK, Block};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
 use crate::math::Aabb;
 use crate::ray::slab::Interval;
 use crate::ray::{Candidate, Packet};
@@ -22,6 +23,9 @@ use crate::ray::{Candidate, Packet};
 /// The triangle kind: nine numbers, three corners' x, y, z.
 #[derive(Clone, Copy, Debug)]
 pub struct Triangle;
+
+/// Eight triangles.
+pub type TriangleBlock<S> = Block<S, { Triangle::FIELDS }>;
 
 /// Why a triangle can never be hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,26 +77,25 @@ impl Triangle {
         Aabb { lo: [low(0), low(1), low(2)], hi: [high(0), high(1), high(2)] }
     }
 
-    /// Nearest hit of `N` rays on one triangle: lanes of `active` where the line meets the triangle at
-    /// `t_min <= t`. `u` and `v` are the weights of the second and third corner.
+    /// Nearest hits of `N` rays on the first `count` triangles of a block. `found` gets, triangle by triangle, the
+    /// candidate (lanes where the line meets the triangle at `t_min <= t`; `u` and `v` are the weights of the second
+    /// and third corner), the lanes it was tested for, and the primitive number.
     #[inline(always)]
     pub fn intersect<V: Lanes>(
         packet: &Packet<V>,
-        n: &[V::Scalar; 9],
+        block: &TriangleBlock<V::Scalar>,
+        count: usize,
         active: u32,
-        mut commit: impl FnMut(&Candidate<V>, u32),
+        mut found: impl FnMut(&Candidate<V>, u32, u32),
     ) {
         // One pass per dominant axis present; coherent packets have one.
         for axis in 0..3 {
             let lanes = packet.dominant[axis] & active;
             if lanes != 0 {
-                let candidate = match axis {
-                    0 => Self::along::<V, 0>(packet, n, lanes),
-                    1 => Self::along::<V, 1>(packet, n, lanes),
-                    _ => Self::along::<V, 2>(packet, n, lanes),
-                };
-                if let Some(candidate) = candidate {
-                    commit(&candidate, lanes);
+                match axis {
+                    0 => Self::along::<V, 0>(packet, block, count, lanes, &mut found),
+                    1 => Self::along::<V, 1>(packet, block, count, lanes, &mut found),
+                    _ => Self::along::<V, 2>(packet, block, count, lanes, &mut found),
                 }
             }
         }
@@ -100,30 +103,41 @@ impl Triangle {
 
     /// The test for lanes whose dominant axis is `K`.
     #[inline(always)]
-    fn along<V: Lanes, const K: usize>(packet: &Packet<V>, n: &[V::Scalar; 9], lanes: u32) -> Option<Candidate<V>> {
-        let (kx, ky) = ((K + 1) % 3, (K + 2) % 3);
-        let corner = |i: usize| {
-            let z = V::splat(n[3 * i + K]) - packet.org[K];
-            let x = packet.shear[0].mul_add(z, V::splat(n[3 * i + kx]) - packet.org[kx]);
-            let y = packet.shear[1].mul_add(z, V::splat(n[3 * i + ky]) - packet.org[ky]);
-            (x, y, z)
-        };
-        let (ax, ay, az) = corner(0);
-        let (bx, by, bz) = corner(1);
-        let (cx, cy, cz) = corner(2);
-        let u = cx * by - cy * bx;
-        let v = ax * cy - ay * cx;
-        let w = bx * ay - by * ax;
-        let zero = V::constant(0.0);
-        let outside = u.fast_min(v).fast_min(w).cmp_lt(zero) & zero.cmp_lt(u.fast_max(v).fast_max(w));
-        let maybe = !outside & V::Mask::from_bits(lanes);
-        if !maybe.any() {
-            return None;
+    fn along<V: Lanes, const K: usize>(
+        packet: &Packet<V>,
+        block: &TriangleBlock<V::Scalar>,
+        count: usize,
+        lanes: u32,
+        found: &mut impl FnMut(&Candidate<V>, u32, u32),
+    ) {
+        let mut wanted = (1u32 << count) - 1;
+        if V::N == 1 {
+            // A single ray tests the whole block at once and looks closer where it is not outside.
+            let splat = |v: Lanes3<V>| v.map(|x| <V::Scalar as Real>::Octo::splat(x.lane(0)));
+            let corners = |f: usize| <V::Scalar as Real>::Octo::load(&block.fields[f]);
+            let edges = Edges::new::<K>(splat(packet.org), splat(packet.shear), corners);
+            wanted &= !edges.outside().bits();
         }
-        let det = u + v + w;
+        while wanted != 0 {
+            let i = wanted.trailing_zeros() as usize & (BLOCK - 1);
+            wanted &= wanted - 1;
+            let corners = |f: usize| V::splat(block.fields[f][i]);
+            let edges = Edges::new::<K>(packet.org, packet.shear, corners);
+            let maybe = !edges.outside() & V::Mask::from_bits(lanes);
+            if maybe.any() {
+                let candidate = Self::accept(packet, &block.get(i), maybe, &edges);
+                found(&candidate, lanes, block.prim[i]);
+            }
+        }
+    }
+
+    /// Depth, weights and segment of lanes that are not outside the triangle.
+    #[inline(always)]
+    fn accept<V: Lanes>(packet: &Packet<V>, n: &[V::Scalar; 9], maybe: V::Mask, e: &Edges<V>) -> Candidate<V> {
+        let det = e.u + e.v + e.w;
         let inv = V::constant(1.0) / det;
-        let (wu, wv, ww) = (u * inv, v * inv, w * inv);
-        let depth = wu.mul_add(az, wv.mul_add(bz, ww * cz));
+        let (wu, wv, ww) = (e.u * inv, e.v * inv, e.w * inv);
+        let depth = wu.mul_add(e.z[0], wv.mul_add(e.z[1], ww * e.z[2]));
         let mut found = Candidate { hit: maybe, t: depth * packet.shear[2], u: wv, v: ww };
         let size = det.abs();
         let sound = V::constant(Self::least_det::<V::Scalar>()).cmp_le(size) & size.cmp_le(V::splat(V::Scalar::MAX));
@@ -137,7 +151,7 @@ impl Triangle {
         // A parameter that overflowed is no hit: it would tie with the end of an infinite segment.
         let finite = found.t.abs().cmp_le(V::splat(V::Scalar::MAX));
         found.hit = found.hit & interval.near.cmp_le(interval.far) & packet.t_min.cmp_le(found.t) & finite;
-        Some(found)
+        found
     }
 
     /// Determinants below this may have lost bits to underflow.
@@ -173,6 +187,40 @@ impl Triangle {
     pub fn normal<S: Real>(numbers: &[S; 9]) -> DVec3 {
         let [a, b, c] = Self::corners(numbers);
         (b - a).cross(c - a)
+    }
+}
+
+/// Edge functions of `N` ray-triangle pairs in the rays' sheared frames, and the corners' depths.
+struct Edges<V> {
+    u: V,
+    v: V,
+    w: V,
+    z: Lanes3<V>,
+}
+
+impl<V: Lanes> Edges<V> {
+    /// For rays with dominant axis `K`; `corner(f)` gives field `f` of the triangles.
+    #[inline(always)]
+    fn new<const K: usize>(org: Lanes3<V>, shear: Lanes3<V>, corner: impl Fn(usize) -> V) -> Self {
+        let (kx, ky) = ((K + 1) % 3, (K + 2) % 3);
+        let sheared = |i: usize| {
+            let z = corner(3 * i + K) - org[K];
+            let x = shear[0].mul_add(z, corner(3 * i + kx) - org[kx]);
+            let y = shear[1].mul_add(z, corner(3 * i + ky) - org[ky]);
+            (x, y, z)
+        };
+        let (ax, ay, az) = sheared(0);
+        let (bx, by, bz) = sheared(1);
+        let (cx, cy, cz) = sheared(2);
+        Self { u: cx * by - cy * bx, v: ax * cy - ay * cx, w: bx * ay - by * ax, z: [az, bz, cz] }
+    }
+
+    /// Pairs with edge functions of both signs. A NaN (overflow) is never outside: the restart decides.
+    #[inline(always)]
+    fn outside(&self) -> V::Mask {
+        let zero = V::constant(0.0);
+        let (low, high) = (self.u.fast_min(self.v).fast_min(self.w), self.u.fast_max(self.v).fast_max(self.w));
+        low.cmp_lt(zero) & zero.cmp_lt(high)
     }
 }
 

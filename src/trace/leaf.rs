@@ -20,7 +20,10 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
     let (at, count) = (leaf.index as usize, usize::from(leaf.count));
     query.count_leaf(lanes, count);
     match Class::ALL[usize::from(leaf.class)] {
-        Class::Triangle => triangles(&object.triangles[at], count, inst, packet, query, lanes),
+        Class::Triangle => {
+            let block = &object.triangles[at];
+            Triangle::intersect(packet, block, count, lanes, |found, lanes, prim| query.take(lanes, found, prim, inst));
+        }
         Class::WorldSphere => spheres(&object.spheres[at], count, inst, packet, query, lanes),
         class => {
             let block = &object.placed[class as usize][at];
@@ -66,21 +69,6 @@ pub fn enter<V: Lanes, const ANY: bool, const COUNT: bool>(
     let interval = Interval::of(packet, instance.bounds.lo, instance.bounds.hi);
     let meets = crate::lanes::LaneMask::bits(interval.meets(packet.t_min, query.hit.t));
     (packet.into_local(&instance.to_local, interval.near), lanes & meets)
-}
-
-#[inline(always)]
-fn triangles<V: Lanes, const ANY: bool, const COUNT: bool>(
-    block: &Block<V::Scalar, 9>,
-    count: usize,
-    inst: u32,
-    packet: &Packet<V>,
-    query: &mut Query<V, ANY, COUNT>,
-    lanes: u32,
-) {
-    for i in 0..count {
-        let prim = block.prim[i];
-        Triangle::intersect(packet, &block.get(i), lanes, |found, lanes| query.take(lanes, found, prim, inst));
-    }
 }
 
 #[inline(always)]

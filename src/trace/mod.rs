@@ -4,6 +4,7 @@
 //! the tree), `packetN` at N lanes. Their hits are equal to the last bit; [`crate::ray::slab`] says why.
 
 mod brute;
+mod bundle;
 mod leaf;
 mod query;
 mod traverse;

@@ -102,14 +102,21 @@ impl<'a, V: Lanes, const ANY: bool, const COUNT: bool> Query<'a, V, ANY, COUNT> 
         }
     }
 
-    /// Counts a node visit of `lanes` that tests `boxes` children.
+    /// Counts a node visit of `lanes`, whose children are tested all at once.
     #[inline(always)]
-    pub fn count_node(&mut self, lanes: u32, boxes: u32) {
+    pub fn count_node(&mut self, lanes: u32) {
         if COUNT {
             self.counters.nodes += 1;
-            self.counters.boxes += u64::from(boxes);
             self.counters.node_lanes_active += u64::from(lanes.count_ones());
             self.counters.node_lanes_total += V::N as u64;
+        }
+    }
+
+    /// Counts a test of one box against every lane.
+    #[inline(always)]
+    pub fn count_box(&mut self) {
+        if COUNT {
+            self.counters.boxes += 1;
         }
     }
 

@@ -5,12 +5,13 @@
 //! single rays after Benthin, Wald, Woop, Ernst, Mark, "Combining Single and Packet-Ray Tracing for Arbitrary Ray
 //! Distributions on the Intel MIC Architecture", 2012.
 
+use super::bundle::Bundle;
 use super::leaf;
 use super::query::Query;
 use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Packet;
-use crate::ray::slab::{Interval, pad};
+use crate::ray::slab::Interval;
 use crate::scene::world::{Object, World};
 
 /// What the leaves of a tree hold.
@@ -102,7 +103,7 @@ fn tree<V, L, const ANY: bool, const COUNT: bool>(
     if tree.nodes.is_empty() {
         return;
     }
-    let order = Order::of(packet, lanes);
+    let mut bundle = Bundle::of(packet, lanes, query.hit.t);
     let base = query.stack.len();
     query.stack.push(root, lanes, V::splat(V::Scalar::LOWEST));
     while let Some((mut child, waiting, near)) = query.stack.pop::<V>(base) {
@@ -117,13 +118,14 @@ fn tree<V, L, const ANY: bool, const COUNT: bool>(
             }
             if child.is_leaf() {
                 leaves.visit(packet, query, child, lanes);
+                bundle.shorten(query.hit.t);
                 break;
             }
             let node = &tree.nodes[child.index as usize];
-            query.count_node(lanes, node.used);
-            (child, lanes) = match order.uniform {
-                true => children::<V, ANY, COUNT, true>(node, packet, query, &order, lanes),
-                false => children::<V, ANY, COUNT, false>(node, packet, query, &order, lanes),
+            query.count_node(lanes);
+            (child, lanes) = match bundle.is_uniform() {
+                true => children::<V, ANY, COUNT, true>(node, packet, query, &bundle, lanes),
+                false => children::<V, ANY, COUNT, false>(node, packet, query, &bundle, lanes),
             };
         }
     }
@@ -144,72 +146,58 @@ fn single<S, L, const ANY: bool, const COUNT: bool>(
     tree(subtree, ray, query, root, 1, leaves);
 }
 
-/// Which of a box's two planes a packet meets first, where all its lanes agree.
-struct Order {
-    uniform: bool,
-    /// Per axis: index of the near plane (0 low, 1 high).
-    near: [usize; 3],
-}
-
-impl Order {
-    #[inline(always)]
-    fn of<V: Lanes>(packet: &Packet<V>, lanes: u32) -> Self {
-        let negative = packet.rcp.map(|r| r.cmp_lt(V::constant(0.0)).bits() & lanes);
-        Self { uniform: negative.iter().all(|&n| n == 0 || n == lanes), near: negative.map(|n| usize::from(n != 0)) }
-    }
-}
-
 /// Tests a node's children, puts all but the nearest on the stack, returns the nearest with its lanes.
 #[inline(always)]
 fn children<V: Lanes, const ANY: bool, const COUNT: bool, const UNIFORM: bool>(
     node: &Node<V::Scalar>,
     packet: &Packet<V>,
     query: &mut Query<V, ANY, COUNT>,
-    order: &Order,
+    bundle: &Bundle<V::Scalar>,
     lanes: u32,
 ) -> (Child, u32) {
+    // First the packet as a whole against all eight boxes; for a single ray that is the test itself.
+    let mut keys = [V::Scalar::ZERO; WIDTH];
+    let mut hit = if UNIFORM { bundle.children::<V>(node, &mut keys) } else { u32::MAX } & ((1 << node.used) - 1);
     let mut nears = [V::constant(0.0); WIDTH];
-    let mut found = [(V::Scalar::ZERO, 0u32, 0usize); WIDTH];
+    let mut meets = [lanes; WIDTH];
+    // Slots by distance, nearest last; any-hit keeps the node's own order (large children first), slot 0 last.
+    let mut order = [0usize; WIDTH];
     let mut count = 0;
-    for slot in 0..(node.used as usize).min(WIDTH) {
-        let interval = if UNIFORM { ordered(node, packet, order, slot) } else { unordered(node, packet, slot) };
-        let meets = interval.meets(packet.t_min, query.hit.t).bits() & lanes;
-        if meets == 0 {
-            continue;
+    while hit != 0 {
+        let slot = if ANY { 31 - hit.leading_zeros() } else { hit.trailing_zeros() } as usize & (WIDTH - 1);
+        hit &= !(1 << slot);
+        if V::N > 1 || !UNIFORM {
+            let interval = if UNIFORM { bundle.interval(packet, node, slot) } else { unordered(packet, node, slot) };
+            query.count_box();
+            meets[slot] &= interval.meets(packet.t_min, query.hit.t).bits();
+            if meets[slot] == 0 {
+                continue;
+            }
+            nears[slot] = interval.near;
+            keys[slot] = interval.near.lane(meets[slot].trailing_zeros() as usize);
+        } else {
+            nears[slot] = V::splat(keys[slot]);
         }
-        nears[slot] = interval.near;
-        let key = if ANY { V::Scalar::ZERO } else { interval.near.lane(meets.trailing_zeros() as usize) };
-        // Insertion by distance, farthest first; any-hit keeps the node's own order, last slot first.
         let mut at = count;
-        while at > 0 && (ANY || found[at - 1].0 < key) {
-            found[at] = found[at - 1];
+        while !ANY && at > 0 && keys[order[at - 1]] < keys[slot] {
+            order[at] = order[at - 1];
             at -= 1;
         }
-        found[at] = (key, meets, slot);
+        order[at] = slot;
         count += 1;
     }
     if count == 0 {
         return (Child::ROOT, 0);
     }
-    for &(_, meets, slot) in &found[..count - 1] {
-        query.stack.push(node.child(slot), meets, nears[slot]);
+    for &slot in &order[..count - 1] {
+        query.stack.push(node.child(slot), meets[slot], nears[slot]);
     }
-    let (_, meets, slot) = found[count - 1];
-    (node.child(slot), meets)
-}
-
-/// The box test where every lane meets the same planes first: no minima and maxima per axis.
-#[inline(always)]
-fn ordered<V: Lanes>(node: &Node<V::Scalar>, packet: &Packet<V>, order: &Order, slot: usize) -> Interval<V> {
-    let [x, y, z] = [0, 1, 2].map(|a| {
-        let plane = |side: usize| (V::splat(node.bounds[a][side][slot]) - packet.org[a]) * packet.rcp[a];
-        (plane(order.near[a]), plane(1 - order.near[a]))
-    });
-    Interval { near: x.0.fast_max(y.0).fast_max(z.0), far: pad(x.1.fast_min(y.1).fast_min(z.1)) }
+    let slot = order[count - 1];
+    (node.child(slot), meets[slot])
 }
 
 #[inline(always)]
-fn unordered<V: Lanes>(node: &Node<V::Scalar>, packet: &Packet<V>, slot: usize) -> Interval<V> {
+fn unordered<V: Lanes>(packet: &Packet<V>, node: &Node<V::Scalar>, slot: usize) -> Interval<V> {
     let bounds = node.child_bounds(slot);
     Interval::of(packet, bounds.lo, bounds.hi)
 }

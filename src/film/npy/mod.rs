@@ -21,7 +21,7 @@ pub use arrays::{
     parse_hits, parse_occlusion, parse_rays, read_hits, read_occlusion, read_rays, write_hits, write_occlusion,
     write_rays,
 };
-pub use planes::{parse_plane, read_plane, write_plane};
+pub use planes::{parse_plane, read_plane, write_plane, write_stack};
 
 #[cfg(test)]
 mod tests;

@@ -48,6 +48,23 @@ fn plane(file: &Path, mut reader: impl Read, len: u64) -> Result<(u32, u32, Plan
     Ok((width, height, data))
 }
 
+/// Writes several float planes as one array of shape (height, width, planes).
+///
+/// # Errors
+/// [`Error::Usage`] if the sizes do not fit; [`Error::Io`].
+pub fn write_stack(path: &Path, width: u32, height: u32, planes: &[&[f32]]) -> Result<()> {
+    let area = u64::from(width) * u64::from(height);
+    if let Some(plane) = planes.iter().find(|plane| plane.len() as u64 != area) {
+        return Err(Error::Usage(format!("a plane of {} samples is not {width}x{height}", plane.len())));
+    }
+    let shape = [u64::from(height), u64::from(width), planes.len() as u64];
+    let head = header::bytes(&Descr::Plain("<f4".to_owned()), &shape);
+    write_atomically(path, |w| {
+        w.write_all(&head)?;
+        (0..area as usize).try_for_each(|i| planes.iter().try_for_each(|plane| w.write_all(&plane[i].to_le_bytes())))
+    })
+}
+
 /// Writes one plane as an array of shape (height, width).
 ///
 /// # Errors

@@ -10,15 +10,22 @@ use crate::ray::{HitPacket, INVALID_ID};
 /// Bits of `t`, `u`, `v` (widened) and the primitive of one lane.
 type Found = ([u64; 3], u32);
 
-/// Commits a triangle to a packet of rays through `active`; `before` fills the hits first.
-fn lanes<V: Lanes>(rays: &[Ray], n: &[V::Scalar; 9], active: u32, t_max: f64) -> Vec<Found> {
+/// Commits a block of triangles to a packet of rays through `active`.
+fn traced<V: Lanes>(rays: &[Ray], block: &Block<V::Scalar, 9>, count: usize, active: u32, t_max: f64) -> Vec<Found> {
     let packet = packet::<V>(rays);
     let mut hits = HitPacket::new(V::constant(t_max));
-    Triangle::intersect(&packet, n, active, |found, lanes| hits.commit(lanes, found, 7, 3));
+    Triangle::intersect(&packet, block, count, active, |found, lanes, prim| hits.commit(lanes, found, prim, 3));
     (0..V::N).map(|i| ([hits.t, hits.u, hits.v].map(|x| x.lane(i).to_f64().to_bits()), hits.prim[i])).collect()
 }
 
-/// `(t, u, v)` of one ray, all widths of the precision agreeing.
+/// The same for a block of one.
+fn lanes<V: Lanes>(rays: &[Ray], n: &[V::Scalar; 9], active: u32, t_max: f64) -> Vec<Found> {
+    let mut block = Block::empty();
+    block.set(0, *n, 7);
+    traced::<V>(rays, &block, 1, active, t_max)
+}
+
+/// `(t, u, v)` of one ray at width 1 (that the widths agree is tested below).
 fn hit<S: Real>(ray: Ray, n: &[S; 9]) -> Option<[f64; 3]> {
     let found = lanes::<S>(&[ray], n, 1, f64::INFINITY)[0];
     (found.1 != INVALID_ID).then(|| found.0.map(f64::from_bits))
@@ -215,6 +222,44 @@ fn every_subset_of_lanes() {
     masks::<f64x4>(0..1 << 4);
     masks::<f64x8>(0..1 << 8);
     masks::<Pair<f64x8>>((0..1 << 16).step_by(7));
+}
+
+/// A block is its triangles: the nearest of them wins, and slots from `count` on are not looked at.
+fn blocks_of<V: Lanes>() {
+    let mut r = Random(14);
+    for count in (1..=8).cycle().take(80) {
+        let mut block = Block::empty();
+        let triangles: Vec<[V::Scalar; 9]> = (0..8).map(|_| record(random_corners(&mut r))).collect();
+        for (i, n) in triangles.iter().enumerate() {
+            block.set(i, *n, i as u32);
+        }
+        let rays: Vec<Ray> = (0..V::N)
+            .map(|_| {
+                let org = r.cube() * 6.0;
+                exact((org, r.cube() - org))
+            })
+            .collect();
+        let got = traced::<V>(&rays, &block, count, V::ALL, f64::INFINITY);
+        for (ray, got) in rays.iter().zip(got) {
+            let each = (0..count).filter_map(|i| hit(*ray, &triangles[i]).map(|h| (h[0], i as u32, h)));
+            let nearest = each.min_by(|a, b| a.0.total_cmp(&b.0));
+            assert_eq!(got.1, nearest.map_or(INVALID_ID, |n| n.1));
+            assert!(nearest.is_none_or(|n| n.2.map(f64::to_bits) == got.0));
+        }
+    }
+}
+
+#[test]
+fn a_block_is_its_triangles() {
+    blocks_of::<f32>();
+    blocks_of::<f32x4>();
+    blocks_of::<f32x8>();
+    blocks_of::<f32x16>();
+    blocks_of::<f64>();
+    blocks_of::<f64x2>();
+    blocks_of::<f64x4>();
+    blocks_of::<f64x8>();
+    blocks_of::<Pair<f64x8>>();
 }
 
 #[test]

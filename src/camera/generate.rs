@@ -1,0 +1,100 @@
+//! Primary rays of a tile.
+//!
+//! A pixel's ray is a function of camera, picture size, pixel and sample alone: f64 arithmetic in one fixed order,
+//! rounded once to the engine's precision. Tile size, crop and thread do not enter.
+
+use super::model::Camera;
+use super::sampling::PixelRandom;
+use super::tiles::{FILE_TILE, PixelRect, Tiling, morton_decode};
+use crate::lanes::Real;
+use crate::ray::Rays;
+
+/// Name of the sub-pixel offsets among the random dimensions of a pixel.
+const DIMENSION: u32 = 0;
+/// Rays of the largest tile.
+const LARGEST_BATCH: usize = (FILE_TILE * FILE_TILE) as usize;
+
+/// Where in its pixel a ray goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SubPixel {
+    /// Through the centre.
+    Centre,
+    /// Through point `sample` of the pixel's own evenly spread sequence (see [`PixelRandom::spread`]).
+    Sample {
+        /// Number of the sample.
+        sample: u32,
+        /// Seed of the picture.
+        seed: u64,
+    },
+}
+
+impl SubPixel {
+    #[inline]
+    fn offset(self, x: u32, y: u32) -> [f64; 2] {
+        match self {
+            Self::Centre => [0.5; 2],
+            Self::Sample { sample, seed } => PixelRandom::new(x, y, seed).spread(sample, DIMENSION),
+        }
+    }
+}
+
+/// Makes `rays` the primary rays of tile number `tile`, in Morton order; rays of pixels outside the picture or
+/// outside `rect` are dead. Segments are [0, infinity]; directions are not unit (see [`Camera`]).
+pub fn fill_tile<S: Real>(
+    camera: &Camera,
+    tiling: &Tiling,
+    tile: u32,
+    rect: PixelRect,
+    sub_pixel: SubPixel,
+    rays: &mut Rays<S>,
+) {
+    let count = tiling.rays_per_tile() as usize;
+    let (x0, y0) = tiling.origin(tile);
+    // Places on the image plane in units of u and v: Hill's W (2c / nCols - 1) and H (2r / nRows - 1).
+    let mut a = [0.0; LARGEST_BATCH];
+    let mut b = [0.0; LARGEST_BATCH];
+    let (columns, rows) = (f64::from(tiling.width()), f64::from(tiling.height()));
+    for i in 0..count {
+        let (dx, dy) = morton_decode(i as u32);
+        let [sx, sy] = sub_pixel.offset(x0 + dx, y0 + dy);
+        let c = f64::from(x0 + dx) + sx;
+        let r = rows - (f64::from(y0 + dy) + sy);
+        a[i] = camera.half_width * (2.0 * c / columns - 1.0);
+        b[i] = camera.half_height * (2.0 * r / rows - 1.0);
+    }
+    rays.reset(count);
+    for axis in 0..3 {
+        let (eye, u, v, n) = (camera.eye[axis], camera.u[axis], camera.v[axis], camera.n[axis]);
+        let (org, dir) = (&mut rays.org[axis][..count], &mut rays.dir[axis][..count]);
+        if camera.parallel {
+            for i in 0..count {
+                org[i] = S::from_f64(eye + (a[i] * u + b[i] * v));
+                dir[i] = S::from_f64(-n);
+            }
+        } else {
+            for i in 0..count {
+                org[i] = S::from_f64(eye);
+                dir[i] = S::from_f64(a[i] * u + b[i] * v - n);
+            }
+        }
+    }
+    let (zero, infinity) = (S::from_f64(0.0), S::from_f64(f64::INFINITY));
+    rays.t_min[..count].fill(zero);
+    rays.t_max[..count].fill(infinity);
+    kill_outside(tiling, (x0, y0), rect, rays);
+}
+
+/// Makes the rays dead whose pixel lies outside the picture or outside `rect`.
+fn kill_outside<S: Real>(tiling: &Tiling, (x0, y0): (u32, u32), rect: PixelRect, rays: &mut Rays<S>) {
+    let wanted = PixelRect { x1: rect.x1.min(tiling.width()), y1: rect.y1.min(tiling.height()), ..rect };
+    let last = tiling.edge() - 1;
+    if wanted.contains(x0, y0) && wanted.contains(x0 + last, y0 + last) {
+        return;
+    }
+    for i in 0..rays.len() {
+        let (dx, dy) = morton_decode(i as u32);
+        if !wanted.contains(x0 + dx, y0 + dy) {
+            rays.kill(i);
+        }
+    }
+}

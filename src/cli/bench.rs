@@ -1,0 +1,155 @@
+//! `lanecast bench`: engines x ray classes x scenes, as a table, as rows, as JSON.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::common::{CameraArgs, OutputArgs, SceneOptions, ThreadArgs};
+use super::interrupt::stopped;
+use super::output::{json_to_stdout, to_stdout};
+use crate::error::{Error, Result};
+use crate::film::write_atomically;
+use crate::measure::bench::{self, Plan};
+use crate::measure::env;
+use crate::measure::raysets::RayKind;
+use crate::measure::rows::{self, LEGEND, Outcome, Row, Run};
+use crate::measure::timing::Workers;
+use crate::scene::description::{Description, Precision};
+use crate::trace::Engines;
+
+/// Scenes of a bench that is not told one.
+const DEFAULT_SCENES: [&str; 3] = ["builtin:cornell", "builtin:sphere-flake", "builtin:terrain"];
+
+/// Picture of a bench unless `--size` says otherwise.
+const DEFAULT_SIZE: (u32, u32) = (384, 224);
+
+const EXAMPLES: &str = "\
+Examples:
+  lanecast bench
+  lanecast bench model.ply --rays primary,ao --engines scalar,packet16 --threads 1
+  lanecast bench model.ply --size 1024x576 --eye 0,1,5 --look-at 0,1,0 -o results
+
+Before the clock starts, every engine's hits are compared bit for bit with the scalar engine's, and a sample
+of those with the f64 oracle; a wrong engine gets no figure and the exit code is 1. Engines take turns
+(A B C, A B C, ...) so that a disturbance of the machine falls on all alike. The clock covers traversal of
+packed rays and the writing of hits, nothing else.";
+
+/// Arguments of `lanecast bench`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct BenchArgs {
+    /// Scenes: files or builtin:NAME [default: small built-in scenes]
+    #[arg(value_name = "SCENE")]
+    scenes: Vec<String>,
+    #[command(flatten)]
+    options: SceneOptions,
+    /// Ray classes
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "primary,shadow,ao,reflect,diffuse")]
+    rays: Vec<RayKind>,
+    /// Engines by name [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    engines: Vec<String>,
+    #[command(flatten)]
+    camera: CameraArgs,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    /// Timed rounds
+    #[arg(long, value_name = "R", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    repeat: u32,
+    /// Seed of the random directions
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder for bench.csv (one row per figure) and bench.env.txt (machine and build)
+    #[arg(short = 'o', long = "output", value_name = "DIR")]
+    folder: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
+}
+
+#[derive(serde::Serialize)]
+struct Report<'a> {
+    run: &'a Run,
+    rows: &'a [Row],
+}
+
+/// Runs `lanecast bench`.
+///
+/// # Errors
+/// Bad input; [`Error::Mismatch`] if an engine is wrong; [`Error::Interrupted`]. What was measured before any of them
+/// is printed and written.
+pub fn run(args: &BenchArgs) -> Result<()> {
+    let workers = Workers::new(args.threads.count())?;
+    let run = Run::now(workers.threads());
+    let facts = env::facts(workers.threads());
+    let mut rows = Vec::new();
+    let finished = measure(args, &workers, &mut rows);
+    if args.output.json {
+        json_to_stdout(&Report { run: &run, rows: &rows })?;
+    } else if !rows.is_empty() {
+        to_stdout(&format!("{}{LEGEND}", rows::table(&rows)))?;
+    }
+    if let (Some(dir), false) = (&args.folder, rows.is_empty()) {
+        write(dir, &run, &rows, &facts)?;
+    }
+    finished?;
+    let wrong = rows.iter().filter(|row| matches!(row.outcome, Outcome::Wrong(_))).count();
+    if wrong > 0 {
+        return Err(Error::Mismatch(format!("bench: {wrong} of {} rows have wrong hits", rows.len())));
+    }
+    Ok(())
+}
+
+/// All scenes; finished rows are in `rows` also when a later scene fails.
+fn measure(args: &BenchArgs, workers: &Workers, rows: &mut Vec<Row>) -> Result<()> {
+    let default: Vec<String> = DEFAULT_SCENES.map(String::from).into();
+    let scenes = if args.scenes.is_empty() { &default } else { &args.scenes };
+    let bar = args.output.progress_bar((scenes.len() * args.rays.len()) as u64, "measuring");
+    for scene in scenes {
+        let description = args.options.load(scene)?;
+        let result = match args.options.precision(&description) {
+            Precision::F32 => one::<f32>(args, workers, &description, &bar, rows),
+            Precision::F64 => one::<f64>(args, workers, &description, &bar, rows),
+        };
+        if result.is_err() {
+            bar.finish_and_clear();
+            return result;
+        }
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+fn one<S: Engines>(
+    args: &BenchArgs,
+    workers: &Workers,
+    description: &Description,
+    bar: &indicatif::ProgressBar,
+    rows: &mut Vec<Row>,
+) -> Result<()> {
+    let size = args.camera.size.unwrap_or(DEFAULT_SIZE);
+    let plan = Plan {
+        kinds: args.rays.clone(),
+        engines: args.engines.clone(),
+        size,
+        repeat: args.repeat,
+        seed: args.seed,
+        preset: args.options.preset(),
+    };
+    let camera = |bounds| args.camera.choose(description, bounds, size);
+    let mut class = "";
+    let mut report = |row: Row| {
+        if class != row.class {
+            class = row.class;
+            bar.inc(1);
+        }
+        rows.push(row);
+    };
+    bench::scene::<S>(workers, description, &camera, &plan, &stopped, &mut report)
+}
+
+fn write(dir: &Path, run: &Run, rows: &[Row], facts: &str) -> Result<()> {
+    std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, e))?;
+    for (name, text) in [("bench.csv", rows::csv(run, rows)), ("bench.env.txt", facts.to_string())] {
+        write_atomically(&dir.join(name), |file| file.write_all(text.as_bytes()))?;
+    }
+    Ok(())
+}

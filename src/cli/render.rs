@@ -1,0 +1,338 @@
+//! `lanecast render`: a picture of a scene.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use super::common::{CameraArgs, DEFAULT_ENGINE, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
+use super::output::json_to_stdout;
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::film::exr::{Compression, ImageInfo};
+use crate::film::{Film, Window, exr, npy, png};
+use crate::lanes::compiled_isa;
+use crate::measure::env::REVISION;
+use crate::render::{Aov, Progress, RenderOptions, RenderOutput, render};
+use crate::scene::description::{Description, Precision};
+use crate::scene::world::World;
+use crate::shade::Integrator;
+use crate::trace::{Engines, engine};
+
+/// Picture size unless `--size` says otherwise.
+const DEFAULT_SIZE: (u32, u32) = (960, 540);
+
+const EXAMPLES: &str = "\
+Examples:
+  lanecast render builtin:sphere-flake -o flake.png
+  lanecast render model.ply -o model.exr --aov Z,N,id.primitive --spp 16
+  lanecast render model.ply -o ao.png --integrator ao --ao-samples 64 --exposure 0.5
+  lanecast render scene.kdl -o cut.exr --size 1920x1080 --crop 100,100,400,300 --camera side
+  lanecast render model.obj -o near.png --eye 0,1,5 --look-at 0,1,0 --fov 35
+
+The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as
+float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy). Ctrl-C writes the finished tiles and exits with 130.";
+
+/// Arguments of `lanecast render`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// File to write: .exr, .png or .npy
+    #[arg(short = 'o', long = "output", value_name = "FILE", value_parser = target)]
+    file: Target,
+    #[command(flatten)]
+    camera: CameraArgs,
+    /// Part of the picture to render, pixels, y down, half open
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = crop, help_heading = "Camera")]
+    crop: Option<Window>,
+    /// What to show: whitted, ao, normals, depth or cost
+    #[arg(long, value_name = "NAME", default_value = Integrator::Whitted.name())]
+    integrator: Integrator,
+    /// Samples per pixel
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    spp: u32,
+    /// Seed of the random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Mirror reflections followed
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    depth: u32,
+    /// Occlusion rays per hit
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    ao_samples: u32,
+    /// Length of occlusion rays as a fraction of the scene's diagonal
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.2)]
+    ao_radius: f64,
+    /// Extra planes: Z, N, albedo, id.instance, id.primitive, cost.nodes, or all
+    #[arg(long, value_name = "LIST", default_value = "")]
+    aov: String,
+    /// Brightness of PNG files: colours times 2^STOPS
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    exposure: f32,
+    /// Engine
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_ENGINE)]
+    engine: String,
+    /// Tile edge: 8, 16 or 32 pixels
+    #[arg(long, value_name = "PIXELS", default_value_t = 32)]
+    tile: u32,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
+}
+
+/// Output formats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Exr,
+    Png,
+    Npy,
+}
+
+/// A file to write and its format.
+#[derive(Clone, Debug)]
+struct Target {
+    path: PathBuf,
+    format: Format,
+}
+
+/// The object of `--json`.
+#[derive(Serialize)]
+struct Report<'a> {
+    scene: &'a str,
+    file: String,
+    size: (u32, u32),
+    window: (u32, u32, u32, u32),
+    planes: Vec<&'a str>,
+    integrator: &'static str,
+    engine: &'static str,
+    precision: &'static str,
+    isa: &'static str,
+    threads: usize,
+    spp: u32,
+    seed: u64,
+    complete: bool,
+    tiles: (u64, u64),
+    rays: Rays,
+    build_seconds: f64,
+    seconds: f64,
+    mrays_per_s: f64,
+}
+
+#[derive(Serialize)]
+struct Rays {
+    primary: u64,
+    shadow: u64,
+    occlusion: u64,
+    mirror: u64,
+    total: u64,
+}
+
+/// A bar that shows tiles, and Ctrl-C.
+struct Watch {
+    bar: ProgressBar,
+    stop: &'static AtomicBool,
+}
+
+impl Progress for Watch {
+    fn tile_done(&self, total: u64) {
+        self.bar.set_length(total);
+        self.bar.inc(1);
+    }
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Runs `lanecast render`.
+///
+/// # Errors
+/// Bad input or options, an output that cannot be written; [`Error::Interrupted`] after Ctrl-C, when the finished
+/// tiles have been written.
+pub fn run(args: &RenderArgs) -> Result<()> {
+    let options = options(args)?;
+    let description = args.scene.load()?;
+    for warning in &description.warnings {
+        args.output.say(&format!("warning: {warning}"));
+    }
+    with_pool(args.threads.count(), || match args.scene.options.precision(&description) {
+        Precision::F32 => picture::<f32>(args, &description, &options),
+        Precision::F64 => picture::<f64>(args, &description, &options),
+    })
+}
+
+/// The options, checked before a long build starts.
+fn options(args: &RenderArgs) -> Result<RenderOptions> {
+    let (width, height) = args.camera.size.unwrap_or(DEFAULT_SIZE);
+    let options = RenderOptions {
+        width,
+        height,
+        crop: args.crop,
+        spp: args.spp,
+        seed: args.seed,
+        integrator: args.integrator,
+        engine: args.engine.clone(),
+        tile: args.tile,
+        depth: args.depth,
+        ao_samples: args.ao_samples,
+        ao_radius: args.ao_radius,
+        aovs: Aov::parse_list(&args.aov)?,
+        count: args.output.verbose > 0,
+    };
+    options.check()?;
+    if args.file.format == Format::Png && !options.aovs.is_empty() {
+        return Err(Error::Usage("PNG holds colours only: --aov needs .exr or .npy".into()));
+    }
+    Ok(options)
+}
+
+fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
+    let engine = engine::<S>(&options.engine)?;
+    let world = World::<S>::compile(description, args.scene.options.preset())?;
+    let (width, height) = (options.width, options.height);
+    let camera = args.camera.choose(description, world.bounds(), (width, height))?;
+    let camera = Camera::new(&camera, f64::from(width) / f64::from(height))?;
+    let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
+    let output = render(&world, description, &camera, options, &watch)?;
+    watch.bar.finish_and_clear();
+    let info = ImageInfo {
+        software: concat!("lanecast ", env!("CARGO_PKG_VERSION")).into(),
+        revision: REVISION.into(),
+        scene_hash: description.hash.clone(),
+        engine: engine.name().into(),
+        isa: compiled_isa().into(),
+        lanes: engine.lanes() as u32,
+        spp: options.spp,
+        seed: options.seed,
+        render_seconds: output.seconds,
+        rays: output.rays.total(),
+        // glam's arrays are lists of columns.
+        world_to_camera: Some(camera.world_to_camera().transpose().to_cols_array_2d()),
+        world_to_ndc: Some(camera.world_to_ndc().transpose().to_cols_array_2d()),
+    };
+    write(&args.file, &output.film, &info, args.exposure)?;
+    let made = Made { engine: engine.name(), precision: S::PRECISION, build_seconds: world.stats().build_seconds };
+    tell(args, &report(args, options, &output, &made), &output)?;
+    if output.is_complete() { Ok(()) } else { Err(Error::Interrupted) }
+}
+
+/// What made a picture.
+struct Made {
+    engine: &'static str,
+    precision: &'static str,
+    build_seconds: f64,
+}
+
+fn report<'a>(args: &'a RenderArgs, options: &RenderOptions, output: &'a RenderOutput, made: &Made) -> Report<'a> {
+    let (film, rays) = (&output.film, output.rays);
+    Report {
+        scene: &args.scene.scene,
+        file: args.file.path.display().to_string(),
+        size: (film.width, film.height),
+        window: (film.window.x0, film.window.y0, film.window.x1, film.window.y1),
+        planes: film.planes.iter().map(|plane| plane.name.as_str()).collect(),
+        integrator: options.integrator.name(),
+        engine: made.engine,
+        precision: made.precision,
+        isa: compiled_isa(),
+        threads: rayon::current_num_threads(),
+        spp: options.spp,
+        seed: options.seed,
+        complete: output.is_complete(),
+        tiles: (output.tiles_done, output.tiles_total),
+        rays: Rays {
+            primary: rays.primary,
+            shadow: rays.shadow,
+            occlusion: rays.occlusion,
+            mirror: rays.mirror,
+            total: rays.total(),
+        },
+        build_seconds: made.build_seconds,
+        seconds: output.seconds,
+        mrays_per_s: rays.total() as f64 / output.seconds.max(f64::MIN_POSITIVE) / 1e6,
+    }
+}
+
+/// What was done: one JSON object on stdout, or a few lines on stderr.
+fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput) -> Result<()> {
+    let (file, (width, height), rays) = (&report.file, report.size, &report.rays);
+    let (done, total) = report.tiles;
+    let part = if report.complete { String::new() } else { format!(", only {done} of {total} tiles") };
+    args.output.say(&format!(
+        "{file}: {width}x{height}{part}, {} rays in {:.3} s with {} ({:.1} Mrays/s, shading included)",
+        rays.total, report.seconds, report.engine, report.mrays_per_s
+    ));
+    args.output.detail(&format!(
+        "rays: {} primary, {} shadow, {} occlusion, {} mirror; build {:.3} s",
+        rays.primary, rays.shadow, rays.occlusion, rays.mirror, report.build_seconds
+    ));
+    let c = &output.counters;
+    args.output.detail(&format!(
+        "visits: {} nodes, {} leaves, {} primitive tests (counting kernels)",
+        c.nodes, c.leaves, c.prims
+    ));
+    if args.output.json { json_to_stdout(report) } else { Ok(()) }
+}
+
+fn write(target: &Target, film: &Film, info: &ImageInfo, exposure: f32) -> Result<()> {
+    match target.format {
+        Format::Exr => exr::write(&target.path, film, info, Compression::default()),
+        Format::Png => png::write(&target.path, film, exposure),
+        Format::Npy => write_npy(&target.path, film),
+    }
+}
+
+/// R, G, B and A as one array, every other plane as one of its own.
+fn write_npy(path: &Path, film: &Film) -> Result<()> {
+    let (width, height) = (film.window.width(), film.window.height());
+    let colors: Vec<&[f32]> = ["R", "G", "B", "A"].iter().filter_map(|name| film.f32_plane(name)).collect();
+    npy::write_stack(path, width, height, &colors)?;
+    film.planes
+        .iter()
+        .skip(colors.len())
+        .try_for_each(|plane| npy::write_plane(&plane_path(path, &plane.name), width, height, &plane.data))
+}
+
+/// `out.npy` and plane `id.instance` give `out.id.instance.npy`.
+fn plane_path(path: &Path, plane: &str) -> PathBuf {
+    path.with_extension(format!("{plane}.npy"))
+}
+
+fn target(text: &str) -> std::result::Result<Target, String> {
+    let path = PathBuf::from(text);
+    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    let format = match extension.as_deref() {
+        Some("exr") => Format::Exr,
+        Some("png") => Format::Png,
+        Some("npy") => Format::Npy,
+        _ => return Err("expected a file name that ends in .exr, .png or .npy".into()),
+    };
+    Ok(Target { path, format })
+}
+
+fn crop(text: &str) -> std::result::Result<Window, String> {
+    let numbers: Option<Vec<u32>> = text.split(',').map(|s| s.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x0, y0, x1, y1]) if x0 < x1 && y0 < y1 => Ok(Window { x0, y0, x1, y1 }),
+        _ => Err("expected X0,Y0,X1,Y1 in pixels with X0 < X1 and Y0 < Y1, for example 100,50,200,150".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_and_crops_parse_or_say_what_is_expected() {
+        assert_eq!(target("a/b.EXR").unwrap().format, Format::Exr);
+        assert!(target("a.jpg").is_err() && target("png").is_err());
+        assert_eq!(crop("1,2,3,4"), Ok(Window { x0: 1, y0: 2, x1: 3, y1: 4 }));
+        for wrong in ["1,2,1,4", "1,2,3", "-1,2,3,4", "a,b,c,d", "1,2,3,4,5"] {
+            assert!(crop(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(plane_path(Path::new("d/out.npy"), "N.X"), Path::new("d/out.N.X.npy"));
+    }
+}

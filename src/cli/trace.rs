@@ -1,0 +1,218 @@
+//! `lanecast trace`: a file of rays through one engine, checked, timed, hits written.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::common::{DEFAULT_ENGINE, OutputArgs, SceneArgs, ThreadArgs};
+use super::interrupt::stopped;
+use super::output::{json_to_stdout, to_stdout};
+use crate::error::{Error, Result};
+use crate::film::npy;
+use crate::lanes::compiled_isa;
+use crate::measure::answers::Answers;
+use crate::measure::raysets::{Query, split};
+use crate::measure::stats::{Summary, summary};
+use crate::measure::timing::{Series, Workers, interleave};
+use crate::ray::Rays;
+use crate::scene::description::{Description, Precision};
+use crate::scene::world::World;
+use crate::trace::{Engine, Engines, engine};
+
+const EXAMPLES: &str = "\
+Examples:
+  lanecast trace model.ply --rays primary.npy
+  lanecast trace model.ply --rays ao.npy --query any --engine scalar --threads 1 --json
+  lanecast trace model.ply --rays primary.npy --hits hits.npy --repeat 1
+
+RAYS are NumPy little-endian f4 of shape (N, 8): ox oy oz t_min dx dy dz t_max.
+The hits are compared bit for bit with the scalar engine before the clock starts.";
+
+/// Arguments of `lanecast trace`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct TraceArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// File of rays
+    #[arg(long, value_name = "FILE.npy")]
+    rays: PathBuf,
+    /// What to ask: closest or any
+    #[arg(long, default_value = "closest")]
+    query: Query,
+    /// Engine
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_ENGINE)]
+    engine: String,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    /// Timed passes
+    #[arg(long, value_name = "R", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    repeat: u32,
+    /// Write the hits: t u v prim inst per ray, or one byte per ray for --query any
+    #[arg(long, value_name = "FILE.npy")]
+    hits: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
+}
+
+/// The object of `--json`.
+#[derive(Serialize)]
+struct Report<'a> {
+    scene: &'a str,
+    engine: &'static str,
+    query: &'static str,
+    precision: &'static str,
+    isa: &'static str,
+    threads: usize,
+    rays: u64,
+    hits: u64,
+    repeat: u32,
+    seconds: Seconds,
+    mrays_per_s: Mrays,
+    build_seconds: f64,
+    bytes: Bytes,
+    checksum: String,
+}
+
+#[derive(Serialize)]
+struct Seconds {
+    min: f64,
+    median: f64,
+    max: f64,
+}
+
+#[derive(Serialize)]
+struct Mrays {
+    best: f64,
+    median: f64,
+}
+
+#[derive(Serialize)]
+struct Bytes {
+    nodes: u64,
+    primitives: u64,
+    total: u64,
+}
+
+/// Runs `lanecast trace`.
+///
+/// # Errors
+/// Bad input; [`Error::Mismatch`] if the engine's hits are not the `scalar` engine's; [`Error::Interrupted`].
+pub fn run(args: &TraceArgs) -> Result<()> {
+    let description = args.scene.load()?;
+    let rays = npy::read_rays(&args.rays)?;
+    match args.scene.options.precision(&description) {
+        Precision::F32 => trace::<f32>(args, &description, &rays),
+        Precision::F64 => trace::<f64>(args, &description, &rays),
+    }
+}
+
+fn trace<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f32>) -> Result<()> {
+    let engine = engine::<S>(&args.engine)?;
+    let workers = Workers::new(args.threads.count())?;
+    let world = workers.install(|| World::<S>::compile(description, args.scene.options.preset()))?;
+    let batches = split::<S>(rays);
+    let answers = checked(&workers, engine, &world, &batches, args.query)?;
+
+    let mut series = [Series::new(engine, answers)];
+    interleave(&workers, &world, &batches, &mut series, (0, args.repeat), &stopped)?;
+    let [Series { answers, seconds, .. }] = series;
+    if let Some(path) = &args.hits {
+        match &answers {
+            Answers::Closest(batches) => npy::write_hits(path, batches)?,
+            Answers::Any(batches) => npy::write_occlusion(path, batches)?,
+        };
+    }
+    let seconds = summary(&seconds).ok_or_else(|| Error::Usage("--repeat 0: nothing to report".into()))?;
+    let stats = world.stats();
+    let count = rays.len() as u64;
+    let report = Report {
+        scene: &args.scene.scene,
+        engine: engine.name(),
+        query: args.query.name(),
+        precision: S::PRECISION,
+        isa: compiled_isa(),
+        threads: workers.threads(),
+        rays: count,
+        hits: answers.hit_count(),
+        repeat: args.repeat,
+        mrays_per_s: Mrays { best: mrays(count, seconds.min), median: mrays(count, seconds.median) },
+        seconds: Seconds { min: seconds.min, median: seconds.median, max: seconds.max },
+        build_seconds: stats.build_seconds,
+        bytes: Bytes {
+            nodes: stats.node_bytes,
+            primitives: stats.prim_bytes,
+            total: stats.node_bytes + stats.prim_bytes,
+        },
+        checksum: format!("{:016x}", answers.checksum()),
+    };
+    if args.output.json { json_to_stdout(&report) } else { to_stdout(&text(&report, &seconds)) }
+}
+
+/// The engine's answers, which also warm caches up, once they are known to be right.
+fn checked<S: Engines>(
+    workers: &Workers,
+    engine: &dyn Engine<S>,
+    world: &World<S>,
+    batches: &[Rays<S>],
+    query: Query,
+) -> Result<Answers<S>> {
+    let mut answers = Answers::new(query, batches);
+    workers.pass(engine, world, batches, &mut answers);
+    if engine.name() != "scalar" {
+        let mut scalar = Answers::new(query, batches);
+        workers.pass(self::engine::<S>("scalar")?, world, batches, &mut scalar);
+        if let Some(d) = answers.difference(&scalar) {
+            let (name, count, first) = (engine.name(), d.count, d.first);
+            return Err(Error::Mismatch(format!(
+                "{name} differs from scalar in {count} rays, ray {first}: {}",
+                d.text
+            )));
+        }
+    }
+    Ok(answers)
+}
+
+/// Million rays per second; 0 for a file without rays.
+fn mrays(rays: u64, seconds: f64) -> f64 {
+    if seconds > 0.0 { rays as f64 / seconds / 1e6 } else { 0.0 }
+}
+
+fn text(report: &Report<'_>, seconds: &Summary) -> String {
+    let share = 100.0 * report.hits as f64 / (report.rays.max(1)) as f64;
+    let mib = report.bytes.total as f64 / f64::from(1 << 20);
+    format!(
+        "{} {} {} {} ({}), {} threads\n\
+         rays     {}, {} hit ({share:.1} %)\n\
+         speed    {:.3} Mrays/s median, {:.3} best of {} (spread {:.1} %)\n\
+         pass     {:.3} ms median\n\
+         build    {:.3} s, {mib:.1} MiB\n\
+         checksum {}\n",
+        report.scene,
+        report.engine,
+        report.query,
+        report.precision,
+        report.isa,
+        report.threads,
+        report.rays,
+        report.hits,
+        report.mrays_per_s.median,
+        report.mrays_per_s.best,
+        report.repeat,
+        100.0 * seconds.spread,
+        1e3 * report.seconds.median,
+        report.build_seconds,
+        report.checksum
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speed_is_rays_over_time() {
+        assert_eq!(mrays(3_000_000, 0.5), 6.0);
+        assert_eq!(mrays(0, 0.0), 0.0);
+    }
+}

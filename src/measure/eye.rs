@@ -1,0 +1,76 @@
+//! From a camera to primary rays and to the place of the default light: where this floor touches `camera`.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::camera::{Camera, FILE_TILE, PixelRect, SubPixel, Tiling, fill_tile};
+use crate::error::Result;
+use crate::lanes::Real;
+use crate::measure::raysets::{Setting, Starts, light_for};
+use crate::ray::{Hits, Rays};
+use crate::scene::description::{CameraDescription, Description};
+use crate::scene::world::World;
+use crate::trace::{Engine, Engines, Scratch, engine};
+
+/// Picks the camera once the bounds of the scene (lower and upper corner, `None` if nothing is bounded) are known.
+pub type Framing<'a> = &'a (dyn Fn(Option<(DVec3, DVec3)>) -> Result<CameraDescription> + Sync);
+
+/// A scene seen by a camera: primary rays, where they hit, and what secondary rays need to know.
+pub struct View {
+    /// Primary rays in ray-file order, one batch per tile.
+    pub primary: Vec<Rays<f32>>,
+    /// Primary hits.
+    pub starts: Starts,
+    /// Light, diagonal and seed.
+    pub setting: Setting,
+}
+
+impl View {
+    /// Looks at `world` (compiled from `description`) through `camera` with `size` (width, height) pixels; the
+    /// primary rays are traced by the `scalar` engine on the current rayon pool.
+    ///
+    /// # Errors
+    /// Those of `camera`, and a camera that cannot see (eye and target coincide, no field of view).
+    pub fn new<S: Engines>(
+        world: &World<S>,
+        description: &Description,
+        camera: Framing<'_>,
+        size: (u32, u32),
+        seed: u64,
+    ) -> Result<Self> {
+        let bounds = world.bounds();
+        let camera = camera(bounds)?;
+        let primary = primary_rays(&camera, size)?;
+        let scalar = engine::<S>("scalar")?;
+        let starts = Starts::trace(world, scalar, &primary);
+        // A scene of nothing but half-spaces has no diagonal; its lengths are then taken as unit length.
+        let diagonal = bounds.map_or(1.0, |(lo, hi)| (hi - lo).length());
+        let up = camera.up.normalize_or_zero();
+        let clearance = clearance(world, scalar, camera.eye, up);
+        let light = light_for(&description.lights, camera.eye, up, diagonal, clearance);
+        Ok(Self { primary, starts, setting: Setting { light, diagonal, seed } })
+    }
+}
+
+/// The rays of `camera` through the pixel centres of a `size` picture, in ray-file order.
+fn primary_rays(camera: &CameraDescription, (width, height): (u32, u32)) -> Result<Vec<Rays<f32>>> {
+    let tiling = Tiling::new(width, height, FILE_TILE)?;
+    let camera = Camera::new(camera, f64::from(width) / f64::from(height))?;
+    let whole = PixelRect { x0: 0, y0: 0, x1: width, y1: height };
+    let tile = |tile| {
+        let mut rays = Rays::new(0);
+        fill_tile(&camera, &tiling, tile, whole, SubPixel::Centre, &mut rays);
+        rays
+    };
+    Ok((0..tiling.tiles()).into_par_iter().map(tile).collect())
+}
+
+/// Distance from `org` along unit `dir` to the first surface; infinite if there is none.
+fn clearance<S: Real>(world: &World<S>, engine: &dyn Engine<S>, org: DVec3, dir: DVec3) -> f64 {
+    let mut rays = Rays::new(1);
+    let (zero, end) = (S::from_f64(0.0), S::from_f64(f64::INFINITY));
+    rays.set(0, org.to_array().map(S::from_f64), dir.to_array().map(S::from_f64), zero, end);
+    let mut hits = Hits::new(1);
+    engine.intersect(world, &rays, &mut hits, &mut Scratch::default(), None);
+    hits.t[0].to_f64()
+}

@@ -1,0 +1,290 @@
+//! Rows of results: one line of CSV per engine, scene and ray class, complete enough to be read alone in a year.
+
+use std::fmt::Write as _;
+
+use crate::lanes::compiled_isa;
+use crate::measure::env;
+use crate::measure::stats::Summary;
+
+/// What is common to all rows of a run.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Run {
+    /// UTC date and time.
+    pub date: String,
+    /// Revision of the build, see [`env::REVISION`].
+    pub revision: &'static str,
+    /// Instruction set of the build.
+    pub isa: &'static str,
+    /// CPU model.
+    pub cpu: String,
+    /// Threads that traced.
+    pub threads: usize,
+    /// The command as typed.
+    pub command: String,
+}
+
+impl Run {
+    /// A run that starts now, with the process's own command line.
+    pub fn now(threads: usize) -> Self {
+        Self {
+            date: env::now(),
+            revision: env::REVISION,
+            isa: compiled_isa(),
+            cpu: env::cpu_model(),
+            threads,
+            command: env::command_line(),
+        }
+    }
+}
+
+/// The scene a row is about.
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct SceneFacts {
+    /// Name as in the description.
+    pub name: String,
+    /// SHA-256 of the scene, hex.
+    pub hash: String,
+    /// Primitives stored (triangles and shapes).
+    pub prims: u64,
+    /// Seconds of compiling: trees and storage.
+    pub build_seconds: f64,
+    /// Bytes of nodes and primitives.
+    pub bytes: u64,
+}
+
+/// What was measured, or why not.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Checked and timed.
+    Timed {
+        /// Seconds per pass.
+        seconds: Summary,
+        /// Passes.
+        repeat: usize,
+        /// Rays that hit.
+        hits: u64,
+        /// Checksum of the answers.
+        checksum: u64,
+        /// Speed relative to `scalar`: median over rounds of its seconds / these seconds.
+        ratio: Option<f64>,
+        /// Lanes active / total over node visits, if the engine counts.
+        node_lane_use: Option<f64>,
+        /// The same over primitive tests.
+        prim_lane_use: Option<f64>,
+    },
+    /// Not run, with the reason.
+    Skipped(String),
+    /// Wrong answers: no figure.
+    Wrong(String),
+}
+
+/// One row.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Row {
+    /// The scene.
+    pub scene: SceneFacts,
+    /// Ray class.
+    pub class: &'static str,
+    /// `closest` or `any`.
+    pub query: &'static str,
+    /// Engine.
+    pub engine: &'static str,
+    /// `f32` or `f64`.
+    pub precision: &'static str,
+    /// Rays in the set, dead ones included.
+    pub rays: u64,
+    /// The rest.
+    pub outcome: Outcome,
+}
+
+impl Row {
+    /// Million rays per second of a pass of `seconds`.
+    pub fn mrays(&self, seconds: f64) -> f64 {
+        self.rays as f64 / seconds / 1e6
+    }
+}
+
+const COLUMNS: &str = "revision,date,cpu,isa,flags,threads,scene,scene_hash,prims,class,query,engine,precision,rays,\
+    status,hits,repeat,best_mrays_per_s,median_mrays_per_s,spread,mad_seconds,ratio_to_scalar,node_lane_use,\
+    prim_lane_use,checksum,build_seconds,bytes,command";
+
+/// The file: a header line and one line per row, RFC 4180 quoting, lines end in LF.
+pub fn csv(run: &Run, rows: &[Row]) -> String {
+    let mut text = format!("{COLUMNS}\n");
+    for row in rows {
+        text.push_str(&line(run, row));
+        text.push('\n');
+    }
+    text
+}
+
+fn line(run: &Run, row: &Row) -> String {
+    let scene = &row.scene;
+    let mut cells: Vec<String> = [run.revision, &run.date, &run.cpu, run.isa, env::FLAGS].map(String::from).into();
+    cells.extend([run.threads.to_string(), scene.name.clone(), scene.hash.clone(), scene.prims.to_string()]);
+    cells.extend([row.class, row.query, row.engine, row.precision].map(String::from));
+    cells.push(row.rays.to_string());
+    let optional = |x: &Option<f64>| x.map_or(String::new(), |x| format!("{x:.4}"));
+    match &row.outcome {
+        Outcome::Timed { seconds, repeat, hits, checksum, ratio, node_lane_use, prim_lane_use } => {
+            cells.extend(["ok".into(), hits.to_string(), repeat.to_string()]);
+            cells.extend([seconds.min, seconds.median].map(|s| format!("{:.4}", row.mrays(s))));
+            cells.extend([format!("{:.4}", seconds.spread), format!("{:.9}", seconds.mad)]);
+            cells.extend([ratio, node_lane_use, prim_lane_use].map(optional));
+            cells.push(format!("{checksum:016x}"));
+        }
+        Outcome::Skipped(why) => cells.extend(without_figures(format!("skipped: {why}"))),
+        Outcome::Wrong(why) => cells.extend(without_figures(format!("wrong: {why}"))),
+    }
+    cells.extend([format!("{:.6}", scene.build_seconds), scene.bytes.to_string(), run.command.clone()]);
+    cells.iter().map(|c| quoted(c)).collect::<Vec<_>>().join(",")
+}
+
+fn without_figures(status: String) -> [String; 11] {
+    let mut cells: [String; 11] = Default::default();
+    cells[0] = status;
+    cells
+}
+
+fn quoted(cell: &str) -> String {
+    if cell.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.into() }
+}
+
+/// The rows as an aligned table for people, one block per scene.
+pub fn table(rows: &[Row]) -> String {
+    let mut text = String::new();
+    let mut scene = None;
+    for row in rows {
+        if scene != Some(&row.scene.name) {
+            scene = Some(&row.scene.name);
+            text.push_str(&heading(&row.scene));
+        }
+        let what = format!("{:<8} {:<7} {:<10} {}", row.class, row.query, row.engine, row.precision);
+        let figures = match &row.outcome {
+            Outcome::Timed { seconds, hits, ratio, node_lane_use, prim_lane_use, .. } => format!(
+                "{:>9.2} {:>9.2} {:>6.1}% {:>8} {:>7} {:>7} {:>10}",
+                row.mrays(seconds.median),
+                row.mrays(seconds.min),
+                100.0 * seconds.spread,
+                ratio.map_or("-".into(), |r| format!("{r:.2}x")),
+                percent(*node_lane_use),
+                percent(*prim_lane_use),
+                hits
+            ),
+            Outcome::Skipped(why) => format!("  skipped: {why}"),
+            Outcome::Wrong(why) => format!("  WRONG: {why}"),
+        };
+        let _infallible = writeln!(text, "  {what} {figures}");
+    }
+    text
+}
+
+fn heading(scene: &SceneFacts) -> String {
+    let mib = scene.bytes as f64 / f64::from(1 << 20);
+    format!(
+        "{}: {} primitives, built in {:.3} s, {mib:.1} MiB\n  {:<8} {:<7} {:<10} {:<3} {:>9} {:>9} {:>7} {:>8} {:>7} {:>7} {:>10}\n",
+        scene.name,
+        scene.prims,
+        scene.build_seconds,
+        "rays",
+        "query",
+        "engine",
+        "",
+        "median",
+        "best",
+        "spread",
+        "scalar",
+        "node",
+        "prim",
+        "hits"
+    )
+}
+
+fn percent(use_of_lanes: Option<f64>) -> String {
+    use_of_lanes.map_or("-".into(), |x| format!("{:.0}%", 100.0 * x))
+}
+
+/// How to read [`table`].
+pub const LEGEND: &str = "median, best: million rays per second; spread: (slowest - fastest) / median pass;\n\
+    scalar: times as fast as the scalar engine, pass by pass; node, prim: lanes used in node and primitive tests.\n";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::stats::summary;
+
+    fn row(outcome: Outcome) -> Row {
+        let scene =
+            SceneFacts { name: "a, \"b\"".into(), hash: "00ff".into(), prims: 12, build_seconds: 0.25, bytes: 1 << 20 };
+        Row { scene, class: "primary", query: "closest", engine: "packet4", precision: "f32", rays: 2_000_000, outcome }
+    }
+
+    fn timed() -> Row {
+        row(Outcome::Timed {
+            seconds: summary(&[1.0, 0.5, 1.0]).unwrap(),
+            repeat: 3,
+            hits: 7,
+            checksum: 0xabc,
+            ratio: Some(2.0),
+            node_lane_use: Some(0.5),
+            prim_lane_use: None,
+        })
+    }
+
+    fn run() -> Run {
+        let (date, cpu, command) = ["2026-01-31T00:00:00Z", "CPU", "lanecast bench"].map(String::from).into();
+        Run { date, revision: "0123456789ab", isa: "avx2", cpu, threads: 2, command }
+    }
+
+    /// Reads a CSV line by the rules of RFC 4180.
+    fn cells(line: &str) -> Vec<String> {
+        let (mut cells, mut open) = (vec![String::new()], false);
+        let mut letters = line.chars().peekable();
+        while let Some(c) = letters.next() {
+            let last = cells.len() - 1;
+            match c {
+                '"' if open && letters.peek() == Some(&'"') => {
+                    letters.next();
+                    cells[last].push('"');
+                }
+                '"' => open = !open,
+                ',' if !open => cells.push(String::new()),
+                c => cells[last].push(c),
+            }
+        }
+        cells
+    }
+
+    /// 2 million rays in a best pass of 0.5 s are 4 Mrays/s, in a median pass of 1 s 2; spread (1 - 0.5) / 1.
+    #[test]
+    fn every_row_fills_every_column() {
+        let rows = [timed(), row(Outcome::Skipped("too, many".into())), row(Outcome::Wrong("ray 3".into()))];
+        let text = csv(&run(), &rows);
+        let lines: Vec<Vec<String>> = text.lines().map(cells).collect();
+        assert_eq!(lines.len(), 4);
+        assert!(lines.iter().all(|l| l.len() == lines[0].len()), "{text}");
+        let cell = |row: usize, name: &str| {
+            lines[row][lines[0].iter().position(|c| c == name).unwrap_or_else(|| panic!("no column {name}"))].clone()
+        };
+        assert_eq!(cell(1, "scene"), "a, \"b\"");
+        assert_eq!(cell(1, "best_mrays_per_s"), "4.0000");
+        assert_eq!(cell(1, "median_mrays_per_s"), "2.0000");
+        assert_eq!(cell(1, "spread"), "0.5000");
+        assert_eq!(cell(1, "ratio_to_scalar"), "2.0000");
+        assert_eq!(cell(1, "checksum"), "0000000000000abc");
+        assert_eq!(cell(2, "status"), "skipped: too, many");
+        assert_eq!(cell(3, "status"), "wrong: ray 3");
+        for row in [2, 3] {
+            assert_eq!((cell(row, "best_mrays_per_s"), cell(row, "command")), (String::new(), "lanecast bench".into()));
+        }
+    }
+
+    #[test]
+    fn the_table_shows_figures_and_reasons() {
+        let text = table(&[timed(), row(Outcome::Wrong("3 rays".into()))]);
+        assert_eq!(text.lines().count(), 4, "{text}");
+        assert!(text.contains("2.00      4.00   50.0%    2.00x     50%       -"), "{text}");
+        assert!(text.contains("WRONG: 3 rays"), "{text}");
+    }
+}

@@ -1,0 +1,138 @@
+//! Answers judged by the f64 oracle: where this floor touches `reference`.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::lanes::Real;
+use crate::measure::answers::Answers;
+use crate::ray::{Hits, Rays};
+use crate::reference::{EngineHit, Oracle, OracleRay, Tally, Verdict, Why};
+use crate::scene::description::Precision;
+
+/// A [`Tally`] in words, for tables and JSON.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Counts {
+    /// Same as the oracle.
+    pub agree: u64,
+    /// Different where the oracle's margin allows it, by reason; reasons that did not occur are left out.
+    pub explained: BTreeMap<String, u64>,
+    /// Different for no good reason: must be 0.
+    pub unexplained: u64,
+    /// The first unexplained rays, with both answers.
+    pub samples: Vec<String>,
+}
+
+impl From<Tally> for Counts {
+    fn from(tally: Tally) -> Self {
+        let kinds = Why::ALL.iter().zip(tally.explained).filter(|(_, count)| *count > 0);
+        let explained = kinds.map(|(why, count)| (why.to_string(), count)).collect();
+        Self { agree: tally.agree, explained, unexplained: tally.unexplained, samples: tally.samples }
+    }
+}
+
+impl Counts {
+    /// Rays judged.
+    pub fn total(&self) -> u64 {
+        self.agree + self.explained_total() + self.unexplained
+    }
+
+    /// Explained differences of all kinds.
+    pub fn explained_total(&self) -> u64 {
+        self.explained.values().sum()
+    }
+}
+
+/// Judges every `stride`-th ray of `batches`, on the current rayon pool. Dead rays are judged too: their answer must
+/// be a miss.
+pub fn judge<S: Real>(
+    oracle: &Oracle,
+    precision: Precision,
+    batches: &[Rays<S>],
+    answers: &Answers<S>,
+    stride: usize,
+) -> Counts {
+    let places = batches.iter().enumerate().flat_map(|(b, rays)| (0..rays.len()).map(move |i| (b, i)));
+    let chosen: Vec<(usize, (usize, usize))> = places.enumerate().step_by(stride.max(1)).collect();
+    let judge_one = |(number, (b, i)): (usize, (usize, usize))| {
+        let ray = oracle_ray(&batches[b], i);
+        let (hit, verdict) = match answers {
+            Answers::Closest(hits) => {
+                let answer = engine_hit(&hits[b], i);
+                (answer.is_some(), oracle.judge(&ray, answer, precision))
+            }
+            Answers::Any(flags) => {
+                let occluded = flags[b][i] != 0;
+                (occluded, oracle.judge_occluded(&ray, occluded, precision))
+            }
+        };
+        (hit, with_number(verdict, number))
+    };
+    let verdicts: Vec<(bool, Verdict)> = chosen.into_par_iter().map(judge_one).collect();
+    let mut tally = Tally::default();
+    verdicts.iter().for_each(|(hit, verdict)| tally.add(*hit, verdict));
+    tally.into()
+}
+
+/// A fault that says which ray of the set it is about, so that it can be found in a ray file.
+fn with_number(verdict: Verdict, number: usize) -> Verdict {
+    match verdict {
+        Verdict::Unexplained(fault) => Verdict::Unexplained(format!("ray {number}: {fault}")),
+        fine => fine,
+    }
+}
+
+fn oracle_ray<S: Real>(rays: &Rays<S>, i: usize) -> OracleRay {
+    let wide = |v: [S; 3]| DVec3::from_array(v.map(S::to_f64));
+    OracleRay {
+        org: wide(rays.org(i)),
+        dir: wide(rays.dir(i)),
+        t_min: rays.t_min[i].to_f64(),
+        t_max: rays.t_max[i].to_f64(),
+    }
+}
+
+fn engine_hit<S: Real>(hits: &Hits<S>, i: usize) -> Option<EngineHit> {
+    hits.is_hit(i).then(|| EngineHit {
+        t: hits.t[i].to_f64(),
+        u: hits.u[i].to_f64(),
+        v: hits.v[i].to_f64(),
+        prim: hits.prim[i],
+        inst: hits.inst[i],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::raysets::Query;
+    use crate::scene::assembly::Assembly;
+    use crate::scene::description::{Description, Item, ItemKind, Shape};
+
+    /// The half-space below z = 0 and rays that fall from z = 1, 2, 3: t = 1, 2, 3.
+    #[test]
+    fn a_wrong_answer_is_counted_with_its_ray() {
+        let mut scene = Description::new("floor");
+        let kind = ItemKind::Shape(Shape::HalfSpace);
+        scene.groups[0].items.push(Item { transform: glam::DAffine3::IDENTITY, material: None, kind });
+        let oracle = Oracle::new(&Assembly::new(&scene).unwrap());
+        let batches = crate::measure::testing::falling_rays::<f32>(&[2, 1]);
+        let mut hits = [Hits::new(2), Hits::new(1)];
+        for (b, i, t) in [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 3.0)] {
+            (hits[b].t[i], hits[b].prim[i], hits[b].inst[i]) = (t, 0, 0);
+        }
+        let count = |hits: &[Hits<f32>], stride| {
+            judge(&oracle, Precision::F32, &batches, &Answers::Closest(hits.to_vec()), stride)
+        };
+        let right = count(&hits, 1);
+        assert_eq!((right.agree, right.unexplained, right.total()), (3, 0, 3), "{right:?}");
+        hits[1].t[0] = 2.5;
+        let wrong = count(&hits, 1);
+        assert_eq!((wrong.agree, wrong.unexplained), (2, 1));
+        assert!(wrong.samples[0].starts_with("ray 2: "), "{wrong:?}");
+        assert_eq!(count(&hits, 2).total(), 2, "every second ray");
+        let none = Answers::new(Query::Any, &batches);
+        assert_eq!(judge(&oracle, Precision::F32, &batches, &none, 1).unexplained, 3);
+    }
+}

@@ -1,0 +1,120 @@
+//! The planes of a picture by name, and what of a sample each shows.
+
+use crate::error::{Error, Result, nearest_name};
+use crate::shade::Sample;
+
+/// One plane of a film.
+#[derive(Clone, Copy, Debug)]
+pub struct Channel {
+    /// Name as image files know it.
+    pub name: &'static str,
+    /// What it shows of a pixel.
+    pub get: Get,
+}
+
+/// Kind and source of a plane's values.
+#[derive(Clone, Copy, Debug)]
+pub enum Get {
+    /// Rounded to f32.
+    F32(fn(&Sample) -> f64),
+    /// As it is.
+    U32(fn(&Sample) -> u32),
+}
+
+/// The planes every picture has: linear colour and coverage.
+pub const COLOR: [Channel; 4] = [
+    Channel { name: "R", get: Get::F32(|s| s.radiance.x) },
+    Channel { name: "G", get: Get::F32(|s| s.radiance.y) },
+    Channel { name: "B", get: Get::F32(|s| s.radiance.z) },
+    Channel { name: "A", get: Get::F32(|s| s.alpha) },
+];
+
+/// A group of planes besides R, G, B and A.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aov {
+    /// `Z`: distance from the ray's origin to the hit, scene units; infinite where nothing was hit.
+    Z,
+    /// `N.X N.Y N.Z`: unit geometric normal in world space, turned towards the viewer; 0 where nothing was hit.
+    Normal,
+    /// `albedo.R albedo.G albedo.B`: diffuse reflectance; 0 where nothing was hit.
+    Albedo,
+    /// `id.instance`: instance number, u32; `INVALID_ID` where nothing was hit.
+    Instance,
+    /// `id.primitive`: primitive number, u32; `INVALID_ID` where nothing was hit.
+    Primitive,
+    /// `cost.nodes`: node visits per primary ray (see [`crate::shade::Sample::nodes`]).
+    Cost,
+}
+
+impl Aov {
+    /// All of them, in the order of the film's planes.
+    pub const ALL: [Self; 6] = [Self::Z, Self::Normal, Self::Albedo, Self::Instance, Self::Primitive, Self::Cost];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Z => "Z",
+            Self::Normal => "N",
+            Self::Albedo => "albedo",
+            Self::Instance => "id.instance",
+            Self::Primitive => "id.primitive",
+            Self::Cost => "cost.nodes",
+        }
+    }
+
+    /// Its planes.
+    pub fn channels(self) -> &'static [Channel] {
+        match self {
+            Self::Z => &[Channel { name: "Z", get: Get::F32(|s| s.distance) }],
+            Self::Normal => &[
+                Channel { name: "N.X", get: Get::F32(|s| s.normal.x) },
+                Channel { name: "N.Y", get: Get::F32(|s| s.normal.y) },
+                Channel { name: "N.Z", get: Get::F32(|s| s.normal.z) },
+            ],
+            Self::Albedo => &[
+                Channel { name: "albedo.R", get: Get::F32(|s| s.albedo.x) },
+                Channel { name: "albedo.G", get: Get::F32(|s| s.albedo.y) },
+                Channel { name: "albedo.B", get: Get::F32(|s| s.albedo.z) },
+            ],
+            Self::Instance => &[Channel { name: "id.instance", get: Get::U32(|s| s.inst) }],
+            Self::Primitive => &[Channel { name: "id.primitive", get: Get::U32(|s| s.prim) }],
+            Self::Cost => &[Channel { name: "cost.nodes", get: Get::F32(|s| s.nodes) }],
+        }
+    }
+
+    /// Reads a comma-separated list; `all` is all of them. The result is in the order of [`Aov::ALL`], each once.
+    ///
+    /// # Errors
+    /// A usage error that lists the names and the nearest one.
+    pub fn parse_list(list: &str) -> Result<Vec<Self>> {
+        let mut wanted = Vec::new();
+        for name in list.split(',').map(str::trim).filter(|name| !name.is_empty()) {
+            match Self::ALL.into_iter().find(|aov| aov.name() == name) {
+                Some(aov) => wanted.push(aov),
+                None if name == "all" => wanted.extend(Self::ALL),
+                None => {
+                    let names = Self::ALL.map(Self::name);
+                    let near = nearest_name(name, names);
+                    let hint = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+                    let names = names.join(", ");
+                    return Err(Error::Usage(format!("unknown AOV `{name}`, expected all or some of {names}{hint}")));
+                }
+            }
+        }
+        Ok(Self::ALL.into_iter().filter(|aov| wanted.contains(aov)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_are_sorted_and_misspellings_explained() {
+        assert_eq!(Aov::parse_list("N, Z,N").unwrap(), [Aov::Z, Aov::Normal]);
+        assert_eq!(Aov::parse_list("all").unwrap(), Aov::ALL);
+        assert_eq!(Aov::parse_list("").unwrap(), []);
+        let message = Aov::parse_list("albdo").unwrap_err().to_string();
+        assert!(message.contains("did you mean `albedo`?"), "{message}");
+    }
+}

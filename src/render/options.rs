@@ -1,0 +1,159 @@
+//! What to render, and who watches.
+
+use super::aov::Aov;
+use crate::camera::{PixelRect, Tiling};
+use crate::error::{Error, Result};
+use crate::film::Window;
+use crate::shade::{Integrator, Settings};
+
+/// Most pixels of a film (a film of 12 planes then takes 12 GiB).
+const MAX_PIXELS: u64 = 1 << 28;
+/// Most samples per pixel and occlusion rays per hit; more is a slip of the keyboard.
+const MAX_SAMPLES: u32 = 1 << 20;
+/// Most mirrors of a path.
+const MAX_DEPTH: u32 = 1 << 10;
+
+/// What to render. Precision is the type parameter of [`super::render`], threads are those of the current rayon
+/// pool.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Width of the whole picture, pixels.
+    pub width: u32,
+    /// Height of the whole picture, pixels.
+    pub height: u32,
+    /// Part of it to render (y down, half open); `None` is all.
+    pub crop: Option<Window>,
+    /// Samples per pixel: 1 goes through the centre, more are spread over the pixel.
+    pub spp: u32,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// What is shown.
+    pub integrator: Integrator,
+    /// Name of the engine.
+    pub engine: String,
+    /// Tile edge: 8, 16 or 32 pixels. With the generic engines it changes no bit of the picture.
+    pub tile: u32,
+    /// Mirror reflections followed.
+    pub depth: u32,
+    /// Occlusion rays per hit.
+    pub ao_samples: u32,
+    /// Length of occlusion rays as a fraction of the diagonal of the scene's bounds.
+    pub ao_radius: f64,
+    /// Extra planes.
+    pub aovs: Vec<Aov>,
+    /// Whether the engine counts its work (slower).
+    pub count: bool,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            width: 960,
+            height: 540,
+            crop: None,
+            spp: 1,
+            seed: 0,
+            integrator: Integrator::default(),
+            engine: "auto".into(),
+            tile: 32,
+            depth: 4,
+            ao_samples: 16,
+            ao_radius: 0.2,
+            aovs: Vec::new(),
+            count: false,
+        }
+    }
+}
+
+impl RenderOptions {
+    /// The tiles of the picture, and the window to render, checked.
+    ///
+    /// # Errors
+    /// A usage error that names the option: sizes, crop and counts out of range.
+    pub fn check(&self) -> Result<(Tiling, Window)> {
+        let fail = |what: String| Err(Error::Usage(what));
+        let tiling = Tiling::new(self.width, self.height, self.tile)?;
+        let window = self.crop.unwrap_or(Window::full(self.width, self.height));
+        let Window { x0, y0, x1, y1 } = window;
+        if x0 >= x1 || y0 >= y1 || x1 > self.width || y1 > self.height {
+            let (width, height) = (self.width, self.height);
+            return fail(format!("crop {x0},{y0},{x1},{y1} is empty or leaves the picture of {width}x{height}"));
+        }
+        if window.area() > MAX_PIXELS {
+            return fail(format!("more than {MAX_PIXELS} pixels in one film; render crops"));
+        }
+        if self.spp == 0 || self.spp > MAX_SAMPLES {
+            return fail(format!("{} samples per pixel: expected 1 to {MAX_SAMPLES}", self.spp));
+        }
+        if self.ao_samples == 0 || self.ao_samples > MAX_SAMPLES {
+            return fail(format!("{} occlusion rays per hit: expected 1 to {MAX_SAMPLES}", self.ao_samples));
+        }
+        if self.depth > MAX_DEPTH {
+            return fail(format!("depth {}: expected at most {MAX_DEPTH}", self.depth));
+        }
+        if self.ao_radius.is_nan() || self.ao_radius <= 0.0 {
+            return fail(format!("occlusion radius {}: expected a positive number", self.ao_radius));
+        }
+        Ok((tiling, window))
+    }
+
+    pub(super) fn settings(&self) -> Settings {
+        Settings {
+            integrator: self.integrator,
+            depth: self.depth,
+            ao_samples: self.ao_samples,
+            ao_radius: self.ao_radius,
+            seed: self.seed,
+            cost: self.integrator == Integrator::Cost || self.aovs.contains(&Aov::Cost),
+            count: self.count,
+        }
+    }
+}
+
+/// The same rectangle as the camera floor knows it.
+pub(super) fn rect_of(window: Window) -> PixelRect {
+    PixelRect { x0: window.x0, y0: window.y0, x1: window.x1, y1: window.y1 }
+}
+
+/// Who watches a render; called from all threads.
+pub trait Progress: Sync {
+    /// One more of `total` tiles is finished.
+    fn tile_done(&self, total: u64);
+    /// Whether to stop; asked before each tile and each further sample of it.
+    fn stopped(&self) -> bool {
+        false
+    }
+}
+
+/// Nobody watches, nobody stops.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {
+    fn tile_done(&self, _: u64) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_out_of_range_are_refused() {
+        let good = RenderOptions { width: 10, height: 10, ..Default::default() };
+        assert!(good.check().is_ok());
+        let window = |x0, y0, x1, y1| Some(Window { x0, y0, x1, y1 });
+        let bad = [
+            RenderOptions { width: 0, ..good.clone() },
+            RenderOptions { width: 65536, height: 65536, ..good.clone() },
+            RenderOptions { tile: 12, ..good.clone() },
+            RenderOptions { spp: 0, ..good.clone() },
+            RenderOptions { ao_samples: 0, ..good.clone() },
+            RenderOptions { ao_radius: f64::NAN, ..good.clone() },
+            RenderOptions { depth: u32::MAX, ..good.clone() },
+            RenderOptions { crop: window(0, 0, 11, 10), ..good.clone() },
+            RenderOptions { crop: window(5, 5, 5, 6), ..good.clone() },
+        ];
+        assert!(bad.iter().all(|options| options.check().is_err()));
+        assert!(RenderOptions { crop: window(9, 9, 10, 10), ..good }.check().is_ok());
+    }
+}

@@ -1,0 +1,130 @@
+//! Meshes of a scene: files, generated ones, polygons. Each distinct one is stored once.
+
+use std::collections::{BTreeSet, HashMap};
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+use super::source::quote;
+use crate::error::Result;
+use crate::scene::description::{Description, Material};
+use crate::scene::mesh::Mesh;
+
+/// Most triangles that generators and polygons of one document may make.
+pub const MAX_GENERATED: u64 = 1 << 24;
+
+/// A mesh read from a file.
+#[derive(Clone, Debug)]
+pub struct MeshFile {
+    /// Its triangles.
+    pub mesh: Mesh,
+    /// SHA-256 of the file's bytes.
+    pub digest: [u8; 32],
+}
+
+/// How mesh references become meshes.
+pub struct MeshFiles<'a> {
+    /// Folder that references are relative to; `None` if the scene has no folder and refers to no files.
+    pub folder: Option<&'a Path>,
+    /// Whether references may leave the folder.
+    pub allow_outside: bool,
+    /// Reads and parses a mesh file.
+    pub read: &'a dyn Fn(&Path) -> Result<MeshFile>,
+}
+
+impl MeshFiles<'_> {
+    /// The file that a scene means by `written`.
+    ///
+    /// # Errors
+    /// References that leave the folder (absolute, through `..`, or through a symbolic link) unless that is
+    /// allowed, and files that do not exist.
+    pub fn resolve(&self, written: &str) -> std::result::Result<PathBuf, String> {
+        let Some(folder) = self.folder else { return Err("a built-in scene refers to no files".into()) };
+        let relative = Path::new(written);
+        let inside = relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        let outside = || format!("{} leaves the scene's folder", quote(written));
+        if written.is_empty() || written.contains('\0') {
+            return Err("expected the name of a mesh file".into());
+        }
+        if !inside && !self.allow_outside {
+            return Err(outside());
+        }
+        let cannot = |e: std::io::Error| format!("cannot open {}: {e}", quote(written));
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let file = folder.join(relative).canonicalize().map_err(cannot)?;
+        let folder = folder.canonicalize().map_err(cannot)?;
+        if !self.allow_outside && !file.starts_with(&folder) {
+            return Err(outside());
+        }
+        Ok(file)
+    }
+}
+
+/// What makes a stored mesh the same as another.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Key {
+    /// The file it was read from, resolved.
+    File(PathBuf),
+    /// The name by which the scene refers to it.
+    Written(String),
+    /// Terrain of a size and seed.
+    Terrain(u32, u32),
+    /// Twig of a number of leaves and a seed.
+    Twig(u32, u32),
+}
+
+/// The meshes found so far.
+#[derive(Debug, Default)]
+pub struct Store {
+    /// Meshes in order of their first use.
+    pub meshes: Vec<Arc<Mesh>>,
+    /// Digests of the files among them, in the same order.
+    pub digests: Vec<[u8; 32]>,
+    by_key: HashMap<Key, u32>,
+    generated: u64,
+}
+
+impl Store {
+    /// The stored mesh with `key`.
+    pub fn find(&self, key: &Key) -> Option<u32> {
+        self.by_key.get(key).copied()
+    }
+
+    /// Takes `triangles` from the allowance of generated triangles; false if it does not suffice.
+    pub fn allow(&mut self, triangles: u64) -> bool {
+        self.generated = self.generated.saturating_add(triangles);
+        self.generated <= MAX_GENERATED
+    }
+
+    /// Makes `key` find mesh `index` too.
+    pub fn alias(&mut self, key: Key, index: u32) {
+        self.by_key.insert(key, index);
+    }
+
+    /// Stores a mesh, under `key` if it may be used again.
+    pub fn add(&mut self, key: Option<Key>, mesh: Mesh) -> u32 {
+        let index = self.meshes.len() as u32;
+        self.meshes.push(Arc::new(mesh));
+        if let Some(key) = key {
+            self.by_key.insert(key, index);
+        }
+        index
+    }
+}
+
+/// The polygon with corners `positions`, fanned from its first corner.
+pub fn polygon(positions: Vec<glam::DVec3>) -> Mesh {
+    let triangles = (2..positions.len() as u32).map(|i| [0, i - 1, i]).collect();
+    Mesh { positions, triangles, groups: Vec::new() }
+}
+
+/// Gives every material name that meshes use and `description` lacks the default look.
+pub fn add_mesh_materials(description: &mut Description) {
+    let mut known: BTreeSet<&str> = description.materials.iter().map(|m| m.name.as_str()).collect();
+    let mut missing = Vec::new();
+    for name in description.meshes.iter().flat_map(|m| &m.groups).map(|g| g.material.as_str()) {
+        if !name.is_empty() && known.insert(name) {
+            missing.push(Material { name: name.into(), ..Material::default() });
+        }
+    }
+    description.materials.extend(missing);
+}

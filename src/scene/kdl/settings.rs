@@ -1,0 +1,206 @@
+//! Statements about the whole scene: its name and units, cameras, lights, background, materials.
+
+use glam::DVec3;
+
+use super::fields::{Fields, NO_REST, colour_from, numbers_of};
+use super::scope::Scope;
+use super::source::{Span, near, quote};
+use super::syntax::{Node, Value};
+use crate::error::{Error, Result};
+use crate::scene::description::{CameraDescription, Light, Material, Precision, Projection};
+
+/// The statements of this file; all belong to the top level.
+pub const NAMES: [&str; 9] =
+    ["scene", "units", "precision", "parameter", "camera", "light", "background", "ambient", "material"];
+
+/// Names of units and their length in metres.
+pub const UNITS: [(&str, f64); 8] = [
+    ("m", 1.0),
+    ("dm", 0.1),
+    ("cm", 0.01),
+    ("mm", 0.001),
+    ("um", 1e-6),
+    ("km", 1000.0),
+    ("in", 0.0254),
+    ("ft", 0.3048),
+];
+
+/// `units mm`: metres per scene unit.
+///
+/// # Errors
+/// An unknown unit.
+pub fn units(scope: &Scope<'_>, node: &Node<'_>) -> Result<f64> {
+    let (name, span) = only_name(scope, node)?;
+    match metres_per(name) {
+        Some(metres) => Ok(metres),
+        None => Err(scope.source.error(span, unknown_unit(name))),
+    }
+}
+
+/// Metres per unit `name`.
+pub fn metres_per(name: &str) -> Option<f64> {
+    UNITS.iter().find(|u| u.0 == name).map(|u| u.1)
+}
+
+/// What to say about a unit that does not exist.
+pub fn unknown_unit(name: &str) -> String {
+    let all: Vec<&str> = UNITS.iter().map(|u| u.0).collect();
+    format!("unknown unit {}: expected one of {}", quote(name), all.join(", "))
+}
+
+/// `precision f64`.
+///
+/// # Errors
+/// Anything but f32 and f64.
+pub fn precision(scope: &Scope<'_>, node: &Node<'_>) -> Result<Precision> {
+    match only_name(scope, node)? {
+        ("f32", _) => Ok(Precision::F32),
+        ("f64", _) => Ok(Precision::F64),
+        (_, span) => Err(scope.source.error(span, "expected f32 or f64")),
+    }
+}
+
+/// The one name after a statement that has nothing else.
+///
+/// # Errors
+/// Anything but one name.
+pub fn only_name<'n, 'a>(scope: &Scope<'a>, node: &'n Node<'a>) -> Result<(&'n str, Span)> {
+    let fields = Fields::collect(scope, node, &[], NO_REST)?;
+    match fields.title()? {
+        Some((name, span)) if !name.is_empty() => Ok((name, span)),
+        _ => Err(fields.error(format!("expected `{}` and a name", node.name))),
+    }
+}
+
+/// `background 0.1 0.2 0.3`: the colour after a statement that has nothing else.
+///
+/// # Errors
+/// Anything but a colour.
+pub fn only_colour(scope: &Scope<'_>, node: &Node<'_>) -> Result<DVec3> {
+    let fields = Fields::collect(scope, node, &[], NO_REST)?;
+    let numbers = numbers_of(scope, &node.entries)?;
+    colour_from(&numbers, f64::INFINITY).map_err(|what| fields.error(format!("`{}` {what}", node.name)))
+}
+
+/// `parameter radius 1.5`, unless `set` gives another value: defines the name in `scope`.
+///
+/// # Errors
+/// Names that are taken or not names, values that are not one number.
+pub fn parameter(scope: &mut Scope<'_>, node: &Node<'_>, set: &[(String, String)]) -> Result<()> {
+    let fields = Fields::collect(scope, node, &[], NO_REST)?;
+    let [name_entry, value] = node.entries.as_slice() else {
+        return Err(fields.error("expected `parameter name value`"));
+    };
+    let Value::Text(name) = &name_entry.value else {
+        return Err(scope.source.error(name_entry.span, "expected the parameter's name"));
+    };
+    if !super::expression::is_free_name(name) {
+        let what = format!("{} cannot name a parameter: letters, digits and _, not a function", quote(name));
+        return Err(scope.source.error(name_entry.span, what));
+    }
+    if scope.parameters.contains_key(name.as_ref()) {
+        return Err(scope.source.error(name_entry.span, format!("parameter {} is defined twice", quote(name))));
+    }
+    let numbers = numbers_of(scope, std::slice::from_ref(value))?;
+    let &[mut number] = numbers.as_slice() else {
+        return Err(scope.source.error(value.span, "a parameter has one value"));
+    };
+    if let Some((_, text)) = set.iter().rev().find(|(n, _)| n == name) {
+        number = super::expression::evaluate(text, scope)
+            .map_err(|fault| Error::Usage(format!("--set {name}={text}: {}", fault.what)))?;
+    }
+    scope.parameters.insert(name.to_string(), number);
+    Ok(())
+}
+
+/// Refuses `--set` names that are no parameters.
+///
+/// # Errors
+/// The first such name, with the names there are.
+pub fn check_set(scope: &Scope<'_>, set: &[(String, String)]) -> Result<()> {
+    let Some((name, _)) = set.iter().find(|(n, _)| !scope.parameters.contains_key(n)) else { return Ok(()) };
+    let names: Vec<&str> = scope.parameters.keys().map(String::as_str).collect();
+    let file = scope.source.file.display();
+    let mut what = format!("--set {name}: {file} has no parameter {}", quote(name));
+    match near(name, names.iter().copied()) {
+        Some(n) => what += &format!("; did you mean `{n}`?"),
+        None if names.is_empty() => what += "; it has none",
+        None => what += &format!("; it has {}", quote(&names.join(", "))),
+    }
+    Err(Error::Usage(what))
+}
+
+/// `camera "main" { eye ..; look-at ..; up ..; fov 45 }` or `parallel 4` instead of `fov`.
+///
+/// # Errors
+/// Fields that do not fit, an eye in the point looked at, an up vector along the view.
+pub fn camera(scope: &Scope<'_>, node: &Node<'_>) -> Result<CameraDescription> {
+    let fields = Fields::collect(scope, node, &["eye", "look-at", "up", "fov", "parallel"], NO_REST)?;
+    let name = fields.title()?.map_or("main", |(name, _)| name);
+    let eye = fields.vector("eye")?.ok_or_else(|| fields.error("a camera needs an `eye`"))?;
+    let look_at = fields.vector("look-at")?.unwrap_or(DVec3::ZERO);
+    let up = fields.direction("up")?.unwrap_or(DVec3::Y);
+    let Some(view) = (look_at - eye).try_normalize() else {
+        return Err(fields.error_at("look-at", "`eye` and `look-at` must differ"));
+    };
+    if view.cross(up.normalize()).length() < 1e-9 {
+        return Err(fields.error_at("up", "`up` must not point along the view"));
+    }
+    let projection = match (fields.number("fov")?, fields.has("parallel")) {
+        (Some(_), true) => return Err(fields.error_at("parallel", "a camera has `fov` or `parallel`, not both")),
+        (_, true) => Projection::Parallel { height: fields.positive("parallel", 1.0)? },
+        (degrees, false) => {
+            let degrees = degrees.unwrap_or(45.0);
+            if !(degrees > 0.0 && degrees < 180.0) {
+                return Err(fields.error_at("fov", format!("`fov` lies between 0 and 180 degrees, found {degrees}")));
+            }
+            Projection::Perspective { theta: degrees.to_radians() }
+        }
+    };
+    Ok(CameraDescription { name: name.into(), eye, look_at, up, projection })
+}
+
+/// `light point { position ..; intensity .. }` or `light directional { direction ..; irradiance .. }`.
+///
+/// # Errors
+/// Other kinds, fields that do not fit.
+pub fn light(scope: &Scope<'_>, node: &Node<'_>) -> Result<Light> {
+    const KINDS: [&str; 2] = ["point", "directional"];
+    let kind = node.entries.iter().find(|e| e.name.is_none());
+    let Some(Value::Text(name)) = kind.map(|e| &e.value) else {
+        return Err(scope.source.error(node.span, "expected `light point` or `light directional`"));
+    };
+    let allowed: &[&str] = match name.as_ref() {
+        "point" => &["position", "intensity"],
+        "directional" => &["direction", "irradiance"],
+        _ => {
+            let span = kind.map_or(node.span, |e| e.span);
+            let what = format!("unknown light {}: expected point or directional", quote(name));
+            return Err(scope.source.error_near(span, what, name, KINDS));
+        }
+    };
+    let fields = Fields::collect(scope, node, allowed, NO_REST)?;
+    fields.title()?;
+    let strength = fields.colour(allowed[1], f64::INFINITY)?.unwrap_or(DVec3::ONE);
+    let missing = || fields.error(format!("a {name} light needs a `{}`", allowed[0]));
+    Ok(match name.as_ref() {
+        "point" => Light::Point { position: fields.vector(allowed[0])?.ok_or_else(missing)?, intensity: strength },
+        _ => Light::Directional { direction: fields.direction(allowed[0])?.ok_or_else(missing)?, irradiance: strength },
+    })
+}
+
+/// `material "red" { diffuse ..; mirror ..; emission .. }`.
+///
+/// # Errors
+/// Fields that do not fit, reflectances above 1.
+pub fn material(scope: &Scope<'_>, node: &Node<'_>) -> Result<Material> {
+    let fields = Fields::collect(scope, node, &["diffuse", "mirror", "emission"], NO_REST)?;
+    let (name, _) = fields.title()?.ok_or_else(|| fields.error("a material needs a name"))?;
+    let plain = Material::default();
+    Ok(Material {
+        name: name.into(),
+        diffuse: fields.colour("diffuse", 1.0)?.unwrap_or(plain.diffuse),
+        mirror: fields.colour("mirror", 1.0)?.unwrap_or(plain.mirror),
+        emission: fields.colour("emission", f64::INFINITY)?.unwrap_or(plain.emission),
+    })
+}

@@ -1,0 +1,48 @@
+//! The integrators by name.
+
+use crate::error::{Error, Result, nearest_name};
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Integrator {
+    /// Recursive ray tracing: Lambert, ambient, shadows, mirrors.
+    /// Source: T. Whitted, *An Improved Illumination Model for Shaded Display*, CACM 23(6), 1980.
+    #[default]
+    Whitted,
+    /// Ambient occlusion: the cosine-weighted share of directions that are free up to a radius.
+    Ao,
+    /// Geometric normals turned towards the viewer, as 0.5 + 0.5 n.
+    Normals,
+    /// Distance from the ray's origin to the hit, scene units.
+    Depth,
+    /// Tree nodes visited per primary ray, as a heat map.
+    Cost,
+}
+
+impl Integrator {
+    /// All integrators.
+    pub const ALL: [Self; 5] = [Self::Whitted, Self::Ao, Self::Normals, Self::Depth, Self::Cost];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Whitted => "whitted",
+            Self::Ao => "ao",
+            Self::Normals => "normals",
+            Self::Depth => "depth",
+            Self::Cost => "cost",
+        }
+    }
+}
+
+impl std::str::FromStr for Integrator {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|i| i.name() == name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name);
+            let hint = nearest_name(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            Error::Usage(format!("unknown integrator `{name}`, expected one of {}{hint}", names.join(", ")))
+        })
+    }
+}

@@ -1,0 +1,98 @@
+//! A packet as one bundle: intervals of origins and reciprocal directions against eight boxes at once.
+//!
+//! Source: the interval arithmetic frustum of Boulos, Wald, Shirley, "Geometric and Arithmetic Culling Methods for
+//! Entire Ray Packets", 2006. Each bound below is the same monotone expression as the box test of
+//! [`crate::ray::slab`], taken at the ends of the intervals, so a box that any lane meets is never rejected. For a
+//! packet of one ray the intervals are points and this is that ray's own test.
+
+use crate::bvh::{Node, WIDTH};
+use crate::lanes::{LaneMask, Lanes, Real};
+use crate::ray::Packet;
+use crate::ray::slab::{Interval, pad};
+
+/// Bounds over some lanes of a packet.
+#[derive(Clone, Copy, Debug)]
+pub struct Bundle<S> {
+    uniform: bool,
+    /// Per axis: index of the plane that is met first (0 low, 1 high).
+    near_side: [usize; 3],
+    /// Origins that give the earliest entry and the latest exit.
+    org_near: [S; 3],
+    org_far: [S; 3],
+    /// Smallest and largest reciprocal direction.
+    rcp: [(S, S); 3],
+    /// Start of the earliest segment, end of the longest.
+    t_min: S,
+    reach: S,
+    lanes: u32,
+}
+
+impl<S: Real> Bundle<S> {
+    /// Bounds over `lanes` (not empty) of `packet`, whose segments end at `t_max`.
+    #[inline(always)]
+    pub fn of<V: Lanes<Scalar = S>>(packet: &Packet<V>, lanes: u32, t_max: V) -> Self {
+        let rcp = packet.rcp.map(|r| r.range(lanes));
+        let org = packet.org.map(|o| o.range(lanes));
+        let backward = rcp.map(|(low, _)| low < S::ZERO);
+        Self {
+            uniform: rcp.iter().all(|(low, high)| (*low < S::ZERO) == (*high < S::ZERO)),
+            near_side: backward.map(usize::from),
+            org_near: [0, 1, 2].map(|a| if backward[a] { org[a].0 } else { org[a].1 }),
+            org_far: [0, 1, 2].map(|a| if backward[a] { org[a].1 } else { org[a].0 }),
+            rcp,
+            t_min: packet.t_min.range(lanes).0,
+            reach: t_max.range(lanes).1,
+            lanes,
+        }
+    }
+
+    /// Whether all lanes look into one octant: only then can the bundle be tested as a whole.
+    #[inline(always)]
+    pub fn is_uniform(&self) -> bool {
+        self.uniform
+    }
+
+    /// Takes in that hits were found.
+    #[inline(always)]
+    pub fn shorten<V: Lanes<Scalar = S>>(&mut self, t: V) {
+        self.reach = t.range(self.lanes).1;
+    }
+
+    /// Children that some lane may meet (a superset; exact for one ray), and where the first enters.
+    #[inline(always)]
+    pub fn children<V: Lanes<Scalar = S>>(&self, node: &Node<S>, near: &mut [S; WIDTH]) -> u32 {
+        let one_ray = V::N == 1;
+        let axis = |a: usize| {
+            let (r0, r1) = (S::Octo::splat(self.rcp[a].0), S::Octo::splat(self.rcp[a].1));
+            let (near_plane, far_plane) = self.planes(node, a);
+            let enter = S::Octo::load(near_plane) - S::Octo::splat(self.org_near[a]);
+            let leave = S::Octo::load(far_plane) - S::Octo::splat(self.org_far[a]);
+            if one_ray {
+                (enter * r0, leave * r0)
+            } else {
+                ((enter * r0).fast_min(enter * r1), (leave * r0).fast_max(leave * r1))
+            }
+        };
+        let (x, y, z) = (axis(0), axis(1), axis(2));
+        let interval = Interval { near: x.0.fast_max(y.0).fast_max(z.0), far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
+        interval.near.store(near);
+        interval.meets(S::Octo::splat(self.t_min), S::Octo::splat(self.reach)).bits()
+    }
+
+    /// One child's box test for every lane of a uniform packet: no minima and maxima per axis.
+    #[inline(always)]
+    pub fn interval<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>, node: &Node<S>, slot: usize) -> Interval<V> {
+        let [x, y, z] = [0, 1, 2].map(|a| {
+            let (near, far) = self.planes(node, a);
+            let plane = |bound: S| (V::splat(bound) - packet.org[a]) * packet.rcp[a];
+            (plane(near[slot]), plane(far[slot]))
+        });
+        Interval { near: x.0.fast_max(y.0).fast_max(z.0), far: pad(x.1.fast_min(y.1).fast_min(z.1)) }
+    }
+
+    #[inline(always)]
+    fn planes<'n>(&self, node: &'n Node<S>, axis: usize) -> (&'n [S; WIDTH], &'n [S; WIDTH]) {
+        let [low, high] = &node.bounds[axis];
+        if self.near_side[axis] == 0 { (low, high) } else { (high, low) }
+    }
+}

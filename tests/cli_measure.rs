@@ -1,0 +1,104 @@
+//! `verify`, `bench` and `info` through the real binary.
+
+mod binary;
+
+use binary::{SQUARE, files, lanecast};
+
+fn square() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("square.ply"), SQUARE).expect("a scene");
+    dir
+}
+
+fn run(dir: &tempfile::TempDir, line: &str) -> binary::Ended {
+    let ended = lanecast(dir.path(), &line.split(' ').collect::<Vec<_>>());
+    assert_eq!(ended.code, Some(0), "{line}: {}{}", ended.out, ended.err);
+    ended
+}
+
+#[test]
+fn verify_covers_every_engine_query_class_and_precision() {
+    let dir = square();
+    let report = run(&dir, "verify square.ply --rays 300 --json").json();
+    assert_eq!(report["pass"], true);
+    let lines = report["lines"].as_array().expect("lines");
+    let count = |key: &str, value: &str| lines.iter().filter(|line| line[key] == value).count();
+    for precision in ["f32", "f64"] {
+        // Some engines exist in one precision only; each answers 5 classes x 2 queries.
+        assert!(count("precision", precision) >= 40 && count("precision", precision) % 10 == 0, "{precision}");
+    }
+    for class in ["primary", "shadow", "ao", "reflect", "diffuse"] {
+        assert_eq!(count("class", class), lines.len() / 5, "{class}");
+    }
+    for engine in ["brute", "scalar", "packet4", "packet8"] {
+        assert_eq!(count("engine", engine), 20, "{engine}");
+    }
+    for line in lines {
+        let judged: u64 = ["agree", "unexplained"].iter().filter_map(|key| line["oracle"][key].as_u64()).sum();
+        let explained: u64 =
+            line["oracle"]["explained"].as_object().expect("reasons").values().filter_map(|n| n.as_u64()).sum();
+        assert_eq!(line["rays"].as_u64(), Some(judged + explained), "every ray is judged: {line}");
+    }
+    assert!(lines.iter().any(|l| l["class"] == "primary" && l["hits"].as_u64() > Some(0)));
+}
+
+#[test]
+fn bench_prints_a_table_and_writes_rows_and_facts() {
+    let dir = square();
+    let table = run(&dir, "bench square.ply --size 64x32 --rays primary,ao --engines scalar,packet8 --repeat 3 -o out");
+    assert_eq!(files(&dir.path().join("out")), ["bench.csv", "bench.env.txt"]);
+    let csv = std::fs::read_to_string(dir.path().join("out/bench.csv")).expect("rows");
+    assert_eq!(csv.lines().count(), 5, "a header, 2 classes x 2 engines: {csv}");
+    assert!(csv.lines().skip(1).all(|line| line.contains(",ok,")), "{csv}");
+    let facts = std::fs::read_to_string(dir.path().join("out/bench.env.txt")).expect("facts");
+    for fact in ["command: ", "cpu: ", "rustc: rustc", "load average: ", "isa compiled: "] {
+        assert!(facts.contains(fact), "{fact} in {facts}");
+    }
+    for word in ["square", "primary", "ao", "scalar", "packet8", "1.00x"] {
+        assert!(table.out.contains(word), "{word} in {}", table.out);
+    }
+}
+
+#[test]
+fn brute_force_beyond_reason_is_skipped_in_words() {
+    let dir = square();
+    let report =
+        run(&dir, "bench builtin:terrain --size 512x512 --rays primary --engines brute --repeat 1 --json").json();
+    let outcome = &report["rows"][0]["outcome"];
+    assert!(outcome["skipped"].as_str().is_some_and(|why| why.contains("limit")), "{report}");
+}
+
+#[test]
+fn info_counts_and_measures() {
+    let dir = square();
+    let report = run(&dir, "info square.ply --json").json();
+    assert_eq!(report["counts"]["primitives"], 2);
+    assert_eq!(report["counts"]["instances"], 1);
+    assert_eq!(report["bounds"]["lower"], serde_json::json!([0.0, 0.0, 0.0]));
+    assert_eq!(report["bounds"]["upper"], serde_json::json!([1.0, 1.0, 0.0]));
+    let text = run(&dir, "info square.ply").out;
+    assert!(text.contains("primitives") && text.contains("SAH cost"), "{text}");
+}
+
+/// Ctrl-C in the middle of a bench: exit code 130, and the output is whole.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_bench_ends_with_130_and_valid_output() {
+    use std::process::{Command, Stdio};
+    let line = "bench builtin:cornell --size 64x64 --rays primary,ao --repeat 1000000 --json";
+    let child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
+        .args(line.split(' '))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary runs");
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    assert!(sent.success());
+    let output = child.wait_with_output().expect("an end");
+    let err = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{err}");
+    assert!(err.contains("interrupted"), "{err}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert!(report["rows"].is_array());
+}

@@ -1,0 +1,108 @@
+//! `render` through the real binary.
+
+mod binary;
+
+use binary::{SQUARE, files, lanecast, refused};
+use lanecast::film::{exr, npy, png};
+
+fn square() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("square.ply"), SQUARE).expect("a scene");
+    dir
+}
+
+/// The unit square in z = 0, seen from z = 2 under 90 degrees: the picture is 4 wide and 4 high at its plane.
+const FRONT: &str = "--eye 0.5,0.5,2 --look-at 0.5,0.5,0 --fov 90 --size 64x64";
+
+fn run(dir: &tempfile::TempDir, line: &str) -> binary::Ended {
+    let ended = lanecast(dir.path(), &line.split(' ').collect::<Vec<_>>());
+    assert_eq!(ended.code, Some(0), "{line}: {}{}", ended.out, ended.err);
+    ended
+}
+
+#[test]
+fn a_square_is_where_it_should_be_with_all_planes_in_exr() {
+    let dir = square();
+    let report = run(&dir, &format!("render square.ply -o out.exr {FRONT} --aov all --json --threads 2")).json();
+    assert_eq!((&report["complete"], &report["rays"]["primary"]), (&true.into(), &4096.into()));
+    assert_eq!(files(dir.path()), ["out.exr", "square.ply"]);
+    let film = exr::read(&dir.path().join("out.exr")).expect("an EXR file");
+    assert_eq!(film.planes.len(), 4 + 1 + 3 + 3 + 1 + 1 + 1);
+    let (alpha, z) = (film.f32_plane("A").expect("A"), film.f32_plane("Z").expect("Z"));
+    for (i, (&a, &z)) in alpha.iter().zip(z).enumerate() {
+        // The square covers the middle quarter each way: pixels 24 to 39.
+        let inside = (24..40).contains(&(i % 64)) && (24..40).contains(&(i / 64));
+        assert_eq!((a, z.is_finite()), (f32::from(u8::from(inside)), inside), "pixel {i}");
+        assert!(!inside || (2.0..2.15).contains(&z));
+    }
+    let ids = film.u32_plane("id.primitive").expect("ids");
+    assert!(ids[32 * 64 + 39] != ids[32 * 64 + 24] || ids[25 * 64 + 39] != ids[38 * 64 + 24], "two triangles");
+}
+
+#[test]
+fn crops_are_data_windows_and_formats_agree() {
+    let dir = square();
+    run(&dir, &format!("render square.ply -o whole.npy {FRONT} --integrator normals --aov id.primitive"));
+    run(&dir, &format!("render square.ply -o crop.exr {FRONT} --integrator normals --crop 20,22,44,42 --engine brute"));
+    run(&dir, &format!("render square.ply -o whole.png {FRONT} --integrator normals --tile 8"));
+    assert_eq!(files(dir.path()), ["crop.exr", "square.ply", "whole.id.primitive.npy", "whole.npy", "whole.png"]);
+    let (width, height, _) = npy::read_plane(&dir.path().join("whole.id.primitive.npy")).expect("ids");
+    assert_eq!((width, height), (64, 64));
+    let whole = std::fs::read(dir.path().join("whole.npy")).expect("colours");
+    let header = String::from_utf8_lossy(&whole[..128]).into_owned();
+    assert!(header.contains("'shape': (64, 64, 4)") && header.contains("<f4"), "{header}");
+    let data = &whole[whole.len() - 64 * 64 * 16..];
+    let crop = exr::read(&dir.path().join("crop.exr")).expect("an EXR file");
+    assert_eq!((crop.width, crop.height), (64, 64));
+    assert_eq!((crop.window.x0, crop.window.y0, crop.window.x1, crop.window.y1), (20, 22, 44, 42));
+    let picture = png::read(&dir.path().join("whole.png")).expect("a PNG file");
+    assert_eq!((picture.width, picture.height), (64, 64));
+    let blue = crop.f32_plane("B").expect("B");
+    for (i, &value) in blue.iter().enumerate() {
+        let (x, y) = (20 + i % 24, 22 + i / 24);
+        let at = (y * 64 + x) * 16 + 8;
+        assert_eq!(value.to_le_bytes(), data[at..at + 4], "pixel {x},{y}");
+        // The normal is +z, towards the eye: 0.5 + 0.5.
+        let inside = (24..40).contains(&x) && (24..40).contains(&y);
+        assert_eq!(value, f32::from(u8::from(inside)));
+    }
+}
+
+#[test]
+fn engines_threads_and_precisions_are_chosen() {
+    let dir = square();
+    let report = run(&dir, &format!(
+        "render square.ply -o a.exr {FRONT} --precision f64 --engine scalar --threads 1 --integrator ao --ao-samples 2 --spp 2 --json"
+    ))
+    .json();
+    for (key, value) in [("precision", "f64"), ("engine", "scalar"), ("integrator", "ao")] {
+        assert_eq!(report[key], value);
+    }
+    assert_eq!((&report["threads"], &report["rays"]["primary"]), (&1.into(), &8192.into()));
+    assert_eq!(report["rays"]["shadow"], 0);
+    assert!(report["rays"]["occlusion"].as_u64() > Some(800));
+}
+
+#[test]
+fn refusals_say_what_is_expected() {
+    let dir = square();
+    for (line, what) in [
+        ("render square.ply -o a.jpg", ".exr, .png or .npy"),
+        ("render square.ply", "--output"),
+        ("render square.ply -o a.exr --integrator normal", "did you mean `normals`?"),
+        ("render square.ply -o a.exr --aov M", "unknown AOV `M`"),
+        ("render square.ply -o a.png --aov Z", "needs .exr or .npy"),
+        ("render square.ply -o a.exr --engine skalar", "scalar"),
+        ("render square.ply -o a.exr --tile 9", "8, 16 or 32"),
+        ("render square.ply -o a.exr --spp 0", "samples per pixel"),
+        ("render square.ply -o a.exr --crop 0,0,9999,5", "leaves the picture"),
+        ("render square.ply -o a.exr --camera front", "no camera `front`"),
+        ("render square.ply -o a.exr --eye 1,1,1 --look-at 1,1,1", "same point"),
+        ("render square.ply -o a.exr --ao-radius -1", "radius"),
+        ("render square.ply -o no/such/folder/a.exr", "no/such/folder"),
+        ("render none.ply -o a.exr", "none.ply"),
+    ] {
+        refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);
+    }
+    assert_eq!(files(dir.path()), ["square.ply"]);
+}
