@@ -41,7 +41,7 @@ pub enum Why {
     Coincident,
     /// The hit is within the margin of an end of the segment.
     SegmentEnd,
-    /// The ray runs almost along the surface.
+    /// The ray runs almost along a triangle.
     Grazing,
 }
 
@@ -205,7 +205,8 @@ impl<'a> Case<'a> {
                 } else if self.at_an_end(&located, order, delta) {
                     reason = reason.or(Some(Why::SegmentEnd));
                 } else if self.missable(&located, delta, until) {
-                    let grazing = located.steepness(self.ray, crossing) < GRAZING;
+                    let edge_on = located.steepness(self.ray, crossing) < GRAZING;
+                    let grazing = edge_on && located.triangle().is_some();
                     reason = Some(if grazing { Why::Grazing } else { border(&located) });
                 } else {
                     return Err(self.skip_fault(&located, crossing, delta));

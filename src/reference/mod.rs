@@ -10,7 +10,7 @@
 //! An engine computes in eps = 2^-24 (f32) or 2^-53 (f64), so it cannot tell geometry apart that differs by less than
 //!
 //! ```text
-//! delta = K eps scale        K = 16 (MARGIN_FACTOR)
+//! delta = K eps scale        K = 8 (MARGIN_FACTOR)
 //! ```
 //!
 //! where `scale` is the largest coordinate that enters the computation for one primitive: of the ray's origin, of
@@ -23,7 +23,8 @@
 //! answer is *explained* if rays displaced sideways by at most delta justify it, *unexplained* if not:
 //!
 //! 1. **What was reported is there.** The point of the ray at the engine's t lies within delta of the reported
-//!    triangle; or, for an analytic shape, the engine's t (give or take delta) is between the crossings of displaced
+//!    triangle; or the line passes the triangle within delta and its plane within delta of that point; or, for an
+//!    analytic shape, the engine's t (give or take delta) is between the crossings of displaced
 //!    rays with it. t is inside the segment, u and v fit.
 //! 2. **What was skipped can be missed.** Every crossing of the true ray before the engine's t (or in the whole
 //!    segment, if the engine reports a miss) is one of these: its surface also passes the engine's point within delta

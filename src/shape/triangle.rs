@@ -6,8 +6,10 @@
 //! * Zero counts as inside for both neighbours (the tie rule then decides), so no double-precision restart is
 //!   needed on edges. It is kept for determinants that under- or overflow the precision.
 //! * The winding is not looked at: both sides are hit.
-//! * `t` is the barycentric mean of the corners' depths, moved into the interval of the triangle's own box
-//!   (see [`crate::ray::slab`]); so even for a sliver seen edge-on it stays on the triangle.
+//! * `t` comes from the triangle's plane, whose normal is computed in f64 without cancellation: the barycentric mean
+//!   of the corners' depths is off by the triangle's aspect ratio, which is 10^4 for a needle. It is then moved into
+//!   the interval of the triangle's own box (see [`crate::ray::slab`]), so that even seen edge-on a hit stays on the
+//!   triangle. The point at `t` is within a few ulps of `|org| + |hit|` of the plane.
 //!
 //! Watertight: the sheared corners depend on the ray and the vertex only, and in the sheared plane the test is a
 //! sign test without rounding errors in sign.
@@ -15,7 +17,7 @@
 use glam::DVec3;
 
 use super::block::{BLOCK, Block};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot};
 use crate::math::Aabb;
 use crate::ray::slab::Interval;
 use crate::ray::{Candidate, Packet};
@@ -136,9 +138,10 @@ impl Triangle {
     fn accept<V: Lanes>(packet: &Packet<V>, n: &[V::Scalar; 9], maybe: V::Mask, e: &Edges<V>) -> Candidate<V> {
         let det = e.u + e.v + e.w;
         let inv = V::constant(1.0) / det;
-        let (wu, wv, ww) = (e.u * inv, e.v * inv, e.w * inv);
-        let depth = wu.mul_add(e.z[0], wv.mul_add(e.z[1], ww * e.z[2]));
-        let mut found = Candidate { hit: maybe, t: depth * packet.shear[2], u: wv, v: ww };
+        let plane = unit_normal(n).map(|x| V::splat(V::Scalar::from_f64(x)));
+        let corner = [0, 1, 2].map(|a| V::splat(n[a]) - packet.org[a]);
+        let t = dot(plane, corner) / dot(plane, packet.dir);
+        let mut found = Candidate { hit: maybe, t, u: e.v * inv, v: e.w * inv };
         let size = det.abs();
         let sound = V::constant(Self::least_det::<V::Scalar>()).cmp_le(size) & size.cmp_le(V::splat(V::Scalar::MAX));
         let doubtful = (maybe & !sound).bits();
@@ -190,12 +193,32 @@ impl Triangle {
     }
 }
 
-/// Edge functions of `N` ray-triangle pairs in the rays' sheared frames, and the corners' depths.
+/// Normal of a triangle, scaled to a largest component of 1, accurate to a few ulps for any sliver: products of f32
+/// differences are exact in f64, those of f64 differences are paired with their rounding errors (Kahan's difference
+/// of products; Jeannerod, Louvet, Muller, "Further analysis of Kahan's algorithm", Math. Comp. 82, 2013).
+#[inline(always)]
+fn unit_normal<S: Real>(n: &[S; 9]) -> [f64; 3] {
+    let edge = |i: usize| [0, 1, 2].map(|a| n[i + a].to_f64() - n[a].to_f64());
+    let (p, q) = (edge(3), edge(6));
+    let minor = |a: usize, b: usize| {
+        if S::EPSILON.to_f64() > f64::EPSILON {
+            p[a] * q[b] - p[b] * q[a]
+        } else {
+            let product = p[b] * q[a];
+            let error = (-p[b]).mul_add(q[a], product);
+            p[a].mul_add(q[b], -product) + error
+        }
+    };
+    let normal = [minor(1, 2), minor(2, 0), minor(0, 1)];
+    let largest = normal[0].abs().max(normal[1].abs()).max(normal[2].abs());
+    normal.map(|x| x / largest)
+}
+
+/// Edge functions of `N` ray-triangle pairs in the rays' sheared frames.
 struct Edges<V> {
     u: V,
     v: V,
     w: V,
-    z: Lanes3<V>,
 }
 
 impl<V: Lanes> Edges<V> {
@@ -207,12 +230,10 @@ impl<V: Lanes> Edges<V> {
             let z = corner(3 * i + K) - org[K];
             let x = shear[0].mul_add(z, corner(3 * i + kx) - org[kx]);
             let y = shear[1].mul_add(z, corner(3 * i + ky) - org[ky]);
-            (x, y, z)
+            (x, y)
         };
-        let (ax, ay, az) = sheared(0);
-        let (bx, by, bz) = sheared(1);
-        let (cx, cy, cz) = sheared(2);
-        Self { u: cx * by - cy * bx, v: ax * cy - ay * cx, w: bx * ay - by * ax, z: [az, bz, cz] }
+        let ((ax, ay), (bx, by), (cx, cy)) = (sheared(0), sheared(1), sheared(2));
+        Self { u: cx * by - cy * bx, v: ax * cy - ay * cx, w: bx * ay - by * ax }
     }
 
     /// Pairs with edge functions of both signs. A NaN (overflow) is never outside: the restart decides.
