@@ -11,7 +11,8 @@ pub struct HalfSpace;
 
 impl Solid for HalfSpace {
     const LO: DVec3 = DVec3::NEG_INFINITY;
-    const HI: DVec3 = DVec3::new(f64::INFINITY, f64::INFINITY, 0.0);
+    // Not z <= 0: hits are clamped to the box, and a level line's end at infinity must stay there.
+    const HI: DVec3 = DVec3::INFINITY;
 
     #[inline(always)]
     fn span<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, _: V::Scalar) -> Span<V> {

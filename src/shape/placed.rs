@@ -72,7 +72,8 @@ impl<V: Lanes> Span<V> {
         let interval = Interval::of(packet, bounds.lo, bounds.hi);
         let consistent = |t: V| packet.t_floor.fast_max(interval.clamp(t));
         let (t_in, t_out) = (consistent(self.t_in), consistent(self.t_out));
-        let entering = packet.t_min.cmp_le(t_in);
+        // A half-space may be entered at minus infinity, which is no boundary whatever the segment.
+        let entering = packet.t_min.cmp_le(t_in) & V::splat(-V::Scalar::MAX).cmp_le(t_in);
         let t = V::select(entering, t_in, t_out);
         let in_front = packet.t_min.cmp_le(t) & t.cmp_le(V::splat(V::Scalar::MAX));
         Candidate {

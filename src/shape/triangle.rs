@@ -151,7 +151,9 @@ impl Triangle {
         let own = Self::bounds(n);
         let interval = Interval::of(packet, own.lo, own.hi);
         found.t = packet.t_floor.fast_max(interval.clamp(found.t));
-        found.hit = found.hit & interval.near.cmp_le(interval.far) & packet.t_min.cmp_le(found.t);
+        // A parameter that overflowed is no hit: it would tie with the end of an infinite segment.
+        let finite = found.t.abs().cmp_le(V::splat(V::Scalar::MAX));
+        found.hit = found.hit & interval.near.cmp_le(interval.far) & packet.t_min.cmp_le(found.t) & finite;
         found
     }
 
