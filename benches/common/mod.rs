@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 use lanecast::lanes::Real;
 use lanecast::ray::Hits;
-use lanecast::scene::description::{CameraDescription, Description, Item, ItemKind, Projection};
+use lanecast::scene::description::{CameraDescription, Description, Item, ItemKind, Light, Projection};
 use lanecast::scene::mesh::Mesh;
 
 /// splitmix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
@@ -65,7 +65,10 @@ pub fn terrain(n: u32) -> Scene {
             mesh.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
         }
     }
-    scene("terrain", mesh, DVec3::new(-1.0, -1.5, 4.0), DVec3::new(5.0, 5.0, 0.0))
+    let mut terrain = scene("terrain", mesh, DVec3::new(-1.0, -1.5, 4.0), DVec3::new(5.0, 5.0, 0.0));
+    // A low sun: hills throw shadows.
+    terrain.description.lights.push(Light::Point { position: DVec3::new(13.0, -2.0, 1.8), intensity: DVec3::ONE });
+    terrain
 }
 
 /// Disconnected triangles that overlap in depth: `n` of them in a cube, seen from outside.
