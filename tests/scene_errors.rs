@@ -269,3 +269,23 @@ fn mesh_references_stay_in_the_folder() {
         }
     }
 }
+
+#[test]
+fn the_fuzz_corpus_has_known_verdicts() {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/kdl");
+    let Ok(entries) = std::fs::read_dir(&corpus) else {
+        println!("SKIPPED: no fuzz corpus for kdl (packaged sources leave it out)");
+        return;
+    };
+    let mut files = 0;
+    for entry in entries {
+        let path = entry.unwrap().path();
+        let result = scene(&std::fs::read(&path).unwrap());
+        // Fuzzers name what they find by its hash; only the seeds written by hand have a known verdict.
+        if path.extension().is_some_and(|e| e == "kdl") {
+            assert_eq!(result.is_err(), path.ends_with("deep.kdl"), "{}: {:?}", path.display(), result.err());
+        }
+        files += 1;
+    }
+    assert!(files >= 5, "the corpus has only {files} files");
+}

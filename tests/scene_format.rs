@@ -61,7 +61,7 @@ fn teaching_is_small_and_gallery_complete() {
     assert!(Assembly::new(&built_in("teaching", &[])).unwrap().instanced_prims() < 30);
     let gallery = built_in("gallery", &[]);
     let has = |wanted: fn(&Shape) -> bool| {
-        let sheared = |t: glam::DMat3| t.x_axis.dot(t.y_axis).abs().max(t.x_axis.dot(t.z_axis).abs()) > 0.1;
+        let sheared = |t: glam::DMat3| t.x_axis.dot(t.y_axis).abs().max(t.x_axis.dot(t.z_axis).abs()) > 0.05;
         gallery.groups[0].items.iter().any(|i| match &i.kind {
             ItemKind::Shape(s) => wanted(s) && sheared(i.transform.matrix3),
             _ => false,

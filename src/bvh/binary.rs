@@ -2,9 +2,9 @@
 //!
 //! obvhs (parallel locally-ordered clustering, Meister and Bittner, TVCG 2018, with reinsertion, EG 2018) works in
 //! f32, takes quadratic time and makes chains when many boxes share a centre, and its areas under- or overflow at
-//! extreme scales. So boxes are brought into a common frame of unit size first, boxes whose centres coincide there
-//! are grouped under one representative, and each group becomes a subtree in a frame of its own. A group that no
-//! frame can separate is halved by size.
+//! extreme scales. So boxes are brought into a common frame of unit size first, boxes whose centres fall into one cell
+//! of a fine grid there are grouped under one representative, and each group becomes a subtree in a frame of its own.
+//! A group that no frame can separate is halved by size.
 
 use obvhs::bvh2::{Bvh2, reinsertion::ReinsertionOptimizer};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
@@ -55,6 +55,10 @@ pub fn build<S: Real>(boxes: &[Aabb<S>], preset: Preset) -> Vec<Binary<S>> {
     }
     nodes
 }
+
+/// Cells per unit of the grid that groups centres: a frame is two units wide. Fine enough that ordinary scenes have
+/// one box per cell, coarse enough that what is left to obvhs has areas that f32 can tell apart.
+const CELLS: f32 = (1 << 20) as f32;
 
 /// Where a subtree's root goes: node and side.
 type Slot = Option<(usize, usize)>;
@@ -117,8 +121,8 @@ fn plant<S: Real>(
     }
 }
 
-/// Brings the boxes of `prims` into a frame of unit size (f32, rounded outwards) and groups those whose centres
-/// coincide there: one box per group, and the groups' members in ascending order.
+/// Brings the boxes of `prims` into a frame of unit size (f32, rounded outwards) and groups those whose centres share
+/// a cell there: one box per group, and the groups' members in ascending order.
 fn group_by_centre<S: Real>(boxes: &[Aabb<S>], prims: &[u32]) -> (Vec<obvhs::aabb::Aabb>, Vec<Vec<u32>>) {
     let all = prims.iter().fold(Aabb::EMPTY, |a, &p| a.union(&boxes[p as usize]));
     let (lo, hi) = all.to_f64();
@@ -127,12 +131,12 @@ fn group_by_centre<S: Real>(boxes: &[Aabb<S>], prims: &[u32]) -> (Vec<obvhs::aab
     let half = (hi * 0.5 - lo * 0.5).max_element();
     let scale = if half > 0.0 { 1.0 / half } else { 0.0 };
     let scale = if scale.is_finite() { scale } else { f64::MAX };
-    let mut keyed: Vec<([u32; 3], u32, Aabb<f32>)> = prims
+    let mut keyed: Vec<([i32; 3], u32, Aabb<f32>)> = prims
         .par_iter()
         .map(|&p| {
             let (lo, hi) = boxes[p as usize].to_f64();
             let b = Aabb::<f32>::enclosing((lo - centre) * scale, (hi - centre) * scale);
-            let key = [0, 1, 2].map(|a| (b.lo[a] + b.hi[a]).to_bits());
+            let key = [0, 1, 2].map(|a| ((b.lo[a] + b.hi[a]) * (0.5 * CELLS)).round() as i32);
             (key, p, b)
         })
         .collect();
@@ -140,7 +144,7 @@ fn group_by_centre<S: Real>(boxes: &[Aabb<S>], prims: &[u32]) -> (Vec<obvhs::aab
     let mut frame_boxes = Vec::new();
     let mut groups: Vec<Vec<u32>> = Vec::new();
     // Groups in order of their first member, so that equal input orders give equal trees.
-    let mut runs: Vec<&[([u32; 3], u32, Aabb<f32>)]> = keyed.chunk_by(|a, b| a.0 == b.0).collect();
+    let mut runs: Vec<&[([i32; 3], u32, Aabb<f32>)]> = keyed.chunk_by(|a, b| a.0 == b.0).collect();
     runs.par_sort_unstable_by_key(|run| run[0].1);
     for run in runs {
         let b = run.iter().fold(Aabb::EMPTY, |a, (_, _, b)| a.union(b));

@@ -61,7 +61,10 @@ fn awkward_boxes_stay_shallow() {
             Aabb { lo: [x, -x, -x], hi: [x, x, x] }
         })
         .collect();
-    for boxes in [same, nested, points, tiny, huge, powers] {
+    // A unit ball of small boxes and one that reaches to the end of f32.
+    let mut far = soup(5000, 9);
+    far.push(Aabb { lo: [-1.0; 3], hi: [3.4e38, 1.0, 1.0] });
+    for boxes in [far, same, nested, points, tiny, huge, powers] {
         let tree = check(&boxes, &vec![0; boxes.len()], Preset::Balanced);
         assert!(tree.depth <= 64, "depth {}", tree.depth);
     }

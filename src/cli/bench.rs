@@ -3,9 +3,10 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::common::{CameraArgs, OutputArgs, SceneOptions, ThreadArgs};
+use super::common::{CameraArgs, OutputArgs, SceneArgs, SceneOptions, ThreadArgs};
 use super::interrupt::stopped;
 use super::output::{json_to_stdout, to_stdout};
+use super::render::{self, RenderArgs};
 use crate::error::{Error, Result};
 use crate::film::write_atomically;
 use crate::measure::bench::{self, Plan};
@@ -58,7 +59,8 @@ pub struct BenchArgs {
     /// Seed of the random directions
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder for bench.csv (one row per figure) and bench.env.txt (machine and build)
+    /// Folder for bench.csv (one row per figure), bench.env.txt (machine and build) and a picture of each scene
+    /// (NAME.exr: colours, depth, normals, ids, node visits)
     #[arg(short = 'o', long = "output", value_name = "DIR")]
     folder: Option<PathBuf>,
     #[command(flatten)]
@@ -89,8 +91,12 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     }
     if let (Some(dir), false) = (&args.folder, rows.is_empty()) {
         write(dir, &run, &rows, &facts)?;
+        args.output.say(&format!("rows: {}", dir.join("bench.csv").display()));
     }
     finished?;
+    if let Some(dir) = &args.folder {
+        pictures(args, dir)?;
+    }
     let wrong = rows.iter().filter(|row| matches!(row.outcome, Outcome::Wrong(_))).count();
     if wrong > 0 {
         return Err(Error::Mismatch(format!("bench: {wrong} of {} rows have wrong hits", rows.len())));
@@ -100,10 +106,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
 
 /// All scenes; finished rows are in `rows` also when a later scene fails.
 fn measure(args: &BenchArgs, workers: &Workers, rows: &mut Vec<Row>) -> Result<()> {
-    let default: Vec<String> = DEFAULT_SCENES.map(String::from).into();
-    let scenes = if args.scenes.is_empty() { &default } else { &args.scenes };
+    let scenes = scenes(args);
     let bar = args.output.progress_bar((scenes.len() * args.rays.len()) as u64, "measuring");
-    for scene in scenes {
+    for scene in &scenes {
         let description = args.options.load(scene)?;
         let result = match args.options.precision(&description) {
             Precision::F32 => one::<f32>(args, workers, &description, &bar, rows),
@@ -115,6 +120,27 @@ fn measure(args: &BenchArgs, workers: &Workers, rows: &mut Vec<Row>) -> Result<(
         }
     }
     bar.finish_and_clear();
+    Ok(())
+}
+
+/// The scenes to measure.
+fn scenes(args: &BenchArgs) -> Vec<String> {
+    if args.scenes.is_empty() { DEFAULT_SCENES.map(String::from).into() } else { args.scenes.clone() }
+}
+
+/// What the rays saw: one EXR per scene, named after it.
+fn pictures(args: &BenchArgs, dir: &Path) -> Result<()> {
+    for scene in scenes(args) {
+        let name = args.options.load(&scene)?.name;
+        // A scene may be called anything; a file may not.
+        let stem: String =
+            name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
+        let path = dir.join(format!("{stem}.exr"));
+        let scene = SceneArgs { scene, options: args.options.clone() };
+        let mut picture = RenderArgs::plain(scene, args.camera.clone(), args.threads, path);
+        picture.output.quiet = args.output.quiet;
+        render::run(&picture)?;
+    }
     Ok(())
 }
 

@@ -147,6 +147,30 @@ impl Progress for Watch {
     }
 }
 
+impl RenderArgs {
+    /// The arguments of a plain EXR picture of a scene: what a bench leaves beside its rows.
+    pub(super) fn plain(scene: SceneArgs, camera: CameraArgs, threads: ThreadArgs, path: PathBuf) -> Self {
+        Self {
+            scene,
+            file: Target { path, format: Format::Exr },
+            camera,
+            crop: None,
+            integrator: Integrator::Whitted,
+            spp: 1,
+            seed: 0,
+            depth: 4,
+            ao_samples: 16,
+            ao_radius: 0.2,
+            aov: "all".into(),
+            exposure: 0.0,
+            engine: DEFAULT_ENGINE.into(),
+            tile: 32,
+            threads,
+            output: OutputArgs::default(),
+        }
+    }
+}
+
 /// Runs `lanecast render`.
 ///
 /// # Errors

@@ -92,8 +92,10 @@ impl<'a> Reader<'a> {
                 return Ok(nodes);
             }
             let dropped = self.slashdash()?;
-            let node = self.node(depth)?;
+            let mut node = self.node(depth)?;
             if !dropped {
+                // A vector's first growth is to four places; most nodes need one.
+                node.entries.shrink_to_fit();
                 nodes.push(node);
             }
         }
@@ -155,7 +157,8 @@ impl<'a> Reader<'a> {
             return Err(self.cursor.error_from(open, format!("blocks nest deeper than {MAX_DEPTH} levels")));
         }
         self.cursor.at += 1;
-        let children = self.nodes(depth + 1)?;
+        let mut children = self.nodes(depth + 1)?;
+        children.shrink_to_fit();
         if !self.cursor.eat("}") {
             return Err(self.cursor.error_from(open, "this `{` has no closing `}`"));
         }
