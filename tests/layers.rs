@@ -73,10 +73,10 @@ fn tokens(text: &str) -> Vec<&str> {
             at = after_quoted(bytes, at, b'"');
         } else if rest.starts_with("'\\") {
             at = after_quoted(bytes, at, b'\'');
-        } else if rest.starts_with('\'') {
+        } else if let Some(after) = rest.strip_prefix('\'') {
             // `'x'` is a character, `'x` a lifetime.
-            let width = rest[1..].chars().next().map_or(0, char::len_utf8);
-            at += if rest[1 + width..].starts_with('\'') { 2 + width } else { 1 };
+            let width = after.chars().next().map_or(0, char::len_utf8);
+            at += if after[width..].starts_with('\'') { 2 + width } else { 1 };
         } else {
             let width = rest.chars().next().map_or(1, char::len_utf8);
             if !rest.starts_with(char::is_whitespace) {

@@ -144,7 +144,7 @@ fn group_by_centre<S: Real>(boxes: &[Aabb<S>], prims: &[u32]) -> (Vec<obvhs::aab
     let mut frame_boxes = Vec::new();
     let mut groups: Vec<Vec<u32>> = Vec::new();
     // Groups in order of their first member, so that equal input orders give equal trees.
-    let mut runs: Vec<&[([i32; 3], u32, Aabb<f32>)]> = keyed.chunk_by(|a, b| a.0 == b.0).collect();
+    let mut runs: Vec<&[_]> = keyed.chunk_by(|a, b| a.0 == b.0).collect();
     runs.par_sort_unstable_by_key(|run| run[0].1);
     for run in runs {
         let b = run.iter().fold(Aabb::EMPTY, |a, (_, _, b)| a.union(b));

@@ -12,6 +12,9 @@ fn bits<S: Real>(x: S) -> u64 {
     if wide.is_nan() { u64::MAX } else { wide.to_bits() }
 }
 
+type Operation<S> = fn(S, S, S) -> S;
+type Comparison<S> = fn(S, S) -> bool;
+
 fn check_width<V: Lanes>() {
     let hard: Vec<V::Scalar> = HARD.iter().map(|&x| V::Scalar::from_f64(x)).collect();
     for start in 0..hard.len() {
@@ -20,7 +23,7 @@ fn check_width<V: Lanes>() {
             let b: Vec<V::Scalar> = (0..V::N).map(|i| hard[(start + 5 * i + shift) % hard.len()]).collect();
             let c: Vec<V::Scalar> = (0..V::N).map(|i| hard[(start + 7 * i + 3 * shift) % hard.len()]).collect();
             let (va, vb, vc) = (V::load(&a), V::load(&b), V::load(&c));
-            let pairs: [(V, fn(V::Scalar, V::Scalar, V::Scalar) -> V::Scalar); 12] = [
+            let pairs: [(V, Operation<V::Scalar>); 12] = [
                 (va + vb, |a, b, _| a + b),
                 (va - vb, |a, b, _| a - b),
                 (va * vb, |a, b, _| a * b),
@@ -40,7 +43,7 @@ fn check_width<V: Lanes>() {
                     assert_eq!(bits(got), bits(want), "op {op} lane {i}/{}: {:?} {:?} {:?}", V::N, a[i], b[i], c[i]);
                 }
             }
-            let masks: [(V::Mask, fn(V::Scalar, V::Scalar) -> bool); 5] = [
+            let masks: [(V::Mask, Comparison<V::Scalar>); 5] = [
                 (va.cmp_lt(vb), |a, b| a < b),
                 (va.cmp_le(vb), |a, b| a <= b),
                 (va.cmp_eq(vb), |a, b| a == b),

@@ -33,7 +33,7 @@ impl Solid for Cuboid {
 
     fn normal(_: DVec3, face: u32, _: f64) -> DVec3 {
         let mut n = DVec3::ZERO;
-        n[(face as usize / 2).min(2)] = if face % 2 == 0 { -1.0 } else { 1.0 };
+        n[(face as usize / 2).min(2)] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
         n
     }
 }

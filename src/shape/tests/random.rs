@@ -10,11 +10,11 @@ pub(super) fn lines(n: usize, seed: u64) -> Vec<Ray> {
     let unit = [DVec3::X, DVec3::Y, DVec3::Z];
     let line = |i: usize| {
         let target = r.cube() * 1.2;
-        let mut o = r.cube() * if i % 3 == 0 { 0.9 } else { 5.0 };
+        let mut o = r.cube() * if i.is_multiple_of(3) { 0.9 } else { 5.0 };
         let mut d = target - o;
         match i % 11 {
             // Parallel to an axis, either way, also starting on the planes of faces and caps.
-            0 | 1 => d = unit[i / 11 % 3] * if i % 2 == 0 { 1.0 } else { -0.5 },
+            0 | 1 => d = unit[i / 11 % 3] * if i.is_multiple_of(2) { 1.0 } else { -0.5 },
             2 => (o.z, d.z) = ((i / 11 % 3) as f64 * 0.5, 0.0),
             3 => d.x = 0.0,
             // Nearly parallel.
