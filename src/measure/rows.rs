@@ -348,4 +348,19 @@ mod tests {
         assert!(text.contains("2.00      4.00   50.0%    2.00x     50%       -"), "{text}");
         assert!(text.contains("WRONG: 3 rays"), "{text}");
     }
+
+    fn peer(mode: &'static str, quoted: bool) -> Row {
+        let peer = PeerRow { mode, quoted, ties: 5, differences: 1, lead: Some(1.5), ..Default::default() };
+        Row { engine: "embree", peer: Some(peer), ..timed() }
+    }
+
+    #[test]
+    fn every_mode_of_a_peer_is_kept_and_the_fastest_shown() {
+        let rows = [peer("8 coherent", false), peer("16 coherent", true)];
+        let text = table(&rows);
+        assert_eq!(text.lines().count(), 3, "{text}");
+        assert!(text.contains("embree [16 coherent]") && text.contains("1.50x       5      1"), "{text}");
+        let csv = csv(&run(), &rows);
+        assert!(csv.contains(",8 coherent,,false,5,1,1.5000,") && csv.contains(",16 coherent,,true,"), "{csv}");
+    }
 }
