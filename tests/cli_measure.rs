@@ -43,10 +43,10 @@ fn verify_covers_every_engine_query_class_and_precision() {
 }
 
 #[test]
-fn bench_prints_a_table_and_writes_rows_and_facts() {
+fn bench_prints_a_table_and_writes_rows_facts_and_a_picture() {
     let dir = square();
     let table = run(&dir, "bench square.ply --size 64x32 --rays primary,ao --engines scalar,packet8 --repeat 3 -o out");
-    assert_eq!(files(&dir.path().join("out")), ["bench.csv", "bench.env.txt"]);
+    assert_eq!(files(&dir.path().join("out")), ["bench.csv", "bench.env.txt", "square.exr"]);
     let csv = std::fs::read_to_string(dir.path().join("out/bench.csv")).expect("rows");
     assert_eq!(csv.lines().count(), 5, "a header, 2 classes x 2 engines: {csv}");
     assert!(csv.lines().skip(1).all(|line| line.contains(",ok,")), "{csv}");

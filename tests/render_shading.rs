@@ -94,10 +94,15 @@ fn lambert_ambient_and_emission_by_hand() {
 }
 
 #[test]
-fn scenes_without_light_get_one_from_the_camera() {
-    let output = picture::<f64>(&scene(Some(0), &[]), &from_above(), &options(1));
-    // The headlight is tilted by (0.3, 0.4): cosine 1 / sqrt(1.25); the default material is 0.7 grey.
-    close(color(&output.film, 0, 0), DVec3::splat(0.7 / 1.25f64.sqrt()));
+fn scenes_without_light_get_one_from_the_camera_that_goes_through_walls() {
+    // The headlight is tilted by (0.3, 0.4): cosine 1 / sqrt(1.25); the default material is 0.7 grey. Around camera
+    // and plane lies a sphere, which no light from outside would enter.
+    let room = scene(Some(0), &[(DVec3::ZERO, 9.0, 0)]);
+    for d in [scene(Some(0), &[]), room] {
+        let output = picture::<f64>(&d, &from_above(), &options(1));
+        close(color(&output.film, 0, 0), DVec3::splat(0.7 / 1.25f64.sqrt()));
+        assert_eq!(output.rays.shadow, 0);
+    }
 }
 
 fn shadows<S: Engines>() {

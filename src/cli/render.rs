@@ -64,7 +64,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", default_value_t = 16)]
     ao_samples: u32,
     /// Length of occlusion rays as a fraction of the scene's diagonal
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.2)]
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.2, allow_negative_numbers = true)]
     ao_radius: f64,
     /// Extra planes: Z, N, albedo, id.instance, id.primitive, cost.nodes, or all
     #[arg(long, value_name = "LIST", default_value = "")]

@@ -16,6 +16,8 @@ mod ftz;
 mod isa;
 mod pair;
 mod scalar;
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+mod startup;
 mod vector;
 
 use std::fmt::Debug;

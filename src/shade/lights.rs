@@ -9,7 +9,8 @@ use crate::lanes::Real;
 use crate::scene::description::Light;
 
 /// The light of scenes that have none: directional, from beside and above the camera, with irradiance pi, so a
-/// surface that faces it shows its own diffuse colour.
+/// surface that faces it shows its own diffuse colour. It goes through walls (the shader asks for no shadows), or
+/// every view from inside a room would be black.
 pub fn headlight(camera: &Camera) -> Light {
     let direction = -(camera.n + 0.3 * camera.u + 0.4 * camera.v).normalize();
     Light::Directional { direction, irradiance: DVec3::splat(PI) }

@@ -17,7 +17,8 @@ const RAY_ROUNDINGS: f64 = 16.0;
 const PRIMITIVE_ROUNDINGS: f64 = 8.0;
 
 /// Bound of the error of a hit point, per axis, scene units: `position` = `org + t dir` was found in precision `S`
-/// from a primitive whose coordinates reach `magnitude`. (gamma_n of Higham's analysis times what was added.)
+/// from a primitive whose coordinates reach `magnitude` (not negative). (gamma_n of Higham's analysis times what was
+/// added.)
 pub fn position_error<S: Real>(org: DVec3, dir: DVec3, t: f64, position: DVec3, magnitude: DVec3) -> DVec3 {
     let gamma = |n: f64| {
         let n_eps = n * S::EPSILON.to_f64();
@@ -57,7 +58,7 @@ mod tests {
                 (DVec3::new(a, b, c) * 2.0 - 1.0) * 10f64.powf(e * 8.0 - 4.0)
             };
             let (position, normal) = (point(0), point(1).normalize());
-            let error = position_error::<S>(point(2), position, 1.0, position, point(4));
+            let error = position_error::<S>(point(2), position, 1.0, position, point(4).abs());
             let signs = DVec3::new(1.0, 1.0, 1.0).copysign(point(3));
             let found = position + error * signs * 0.9;
             let org = offset_origin::<S>(found, error, normal);

@@ -152,6 +152,8 @@ pub struct Shader<'a, S: Real> {
     pub(super) world: &'a World<S>,
     pub(super) engine: &'a dyn Engine<S>,
     pub(super) lights: Vec<Light>,
+    /// Whether lights cast shadows: those of a scene do, the default light does not.
+    pub(super) shadows: bool,
     pub(super) background: DVec3,
     pub(super) ambient: DVec3,
     pub(super) settings: Settings,
@@ -163,7 +165,7 @@ pub struct Shader<'a, S: Real> {
 
 impl<'a, S: Real> Shader<'a, S> {
     /// A shader for `world`, compiled from `description`, with rays traced by `engine`. `default_light` lights
-    /// scenes that have no light (see [`super::headlight`]).
+    /// scenes that have no light, without shadows (see [`super::headlight`]).
     pub fn new(
         world: &'a World<S>,
         description: &'a Description,
@@ -178,6 +180,7 @@ impl<'a, S: Real> Shader<'a, S> {
             world,
             engine,
             lights,
+            shadows: !description.lights.is_empty(),
             background: description.background,
             ambient: description.ambient,
             settings,

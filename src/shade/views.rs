@@ -12,8 +12,8 @@ const HEAT: [DVec3; 5] = [
     DVec3::new(1.0, 0.7, 0.0),
     DVec3::new(1.0, 1.0, 1.0),
 ];
-/// The hottest colour stands for 2^8 - 1 node visits per ray.
-const HOTTEST_LOG2: f64 = 8.0;
+/// The hottest colour stands for 2^6 - 1 node visits per ray.
+const HOTTEST_LOG2: f64 = 6.0;
 
 /// Normals n as 0.5 + 0.5 n; misses black.
 pub(super) fn normals(out: &mut [Sample]) {
@@ -60,11 +60,11 @@ mod tests {
     #[test]
     fn dearer_is_brighter() {
         let mut out: Vec<Sample> =
-            [0.0, 1.0, 15.0, 100.0, 255.0, 1e9].map(|nodes| Sample { nodes, ..Sample::MISS }).to_vec();
+            [0.0, 1.0, 7.0, 30.0, 63.0, 1e9].map(|nodes| Sample { nodes, ..Sample::MISS }).to_vec();
         cost(&mut out);
         let luminance = |s: &Sample| s.radiance.dot(DVec3::new(0.2126, 0.7152, 0.0722));
         assert!(out.windows(2).all(|w| luminance(&w[0]) <= luminance(&w[1])));
-        assert_eq!(out[2].radiance, HEAT[2], "log2(16) is the middle of 0 to 8");
+        assert_eq!(out[2].radiance, HEAT[2], "log2(8) is the middle of 0 to 6");
         assert_eq!((out[4].radiance, out[5].radiance), (DVec3::ONE, DVec3::ONE));
     }
 }

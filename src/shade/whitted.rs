@@ -53,6 +53,10 @@ impl<S: Real> Shader<'_, S> {
                 (value != DVec3::ZERO).then_some((vertex, value))
             })
             .collect();
+        if !self.shadows {
+            lit.iter().for_each(|(vertex, value)| out[vertex.path as usize].radiance += *value);
+            return;
+        }
         if lit.is_empty() {
             return;
         }
