@@ -60,6 +60,33 @@ fn bench_prints_a_table_and_writes_rows_facts_and_a_picture() {
 }
 
 #[test]
+fn peers_are_rows_and_a_missing_one_says_so() {
+    let dir = square();
+    let line = "bench square.ply --size 64x32 --rays primary,ao --engines scalar,packet8 --repeat 3 \
+                --peers obvhs,embree --embree nowhere.so --json";
+    let report = run(&dir, line).json();
+    let rows = report["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 10, "2 classes x (2 engines, 2 trees of obvhs, no Embree): {report}");
+    let hits = |engine: &str, class: &str| {
+        let found = rows.iter().find(|row| row["engine"] == engine && row["class"] == class);
+        found.and_then(|row| row["outcome"]["timed"]["hits"].as_u64()).unwrap_or_else(|| panic!("{engine}: {report}"))
+    };
+    for class in ["primary", "ao"] {
+        for peer in ["obvhs-bvh2", "obvhs-cwbvh"] {
+            assert_eq!(hits(peer, class), hits("scalar", class), "{peer} {class}");
+        }
+    }
+    for row in rows {
+        let (peer, outcome) = (&row["peer"], &row["outcome"]);
+        match row["engine"].as_str() {
+            Some("embree") => assert!(outcome["skipped"].as_str().is_some_and(|why| why.contains("nowhere.so"))),
+            Some("scalar" | "packet8") => assert!(peer.is_null()),
+            _ => assert!(peer["lead"].as_f64() > Some(0.0) && peer["quoted"] == true, "{row}"),
+        }
+    }
+}
+
+#[test]
 fn brute_force_beyond_reason_is_skipped_in_words() {
     let dir = square();
     let report =

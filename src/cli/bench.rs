@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::film::write_atomically;
 use crate::measure::bench::{self, Plan};
 use crate::measure::env;
+use crate::measure::peers::Invitation;
 use crate::measure::raysets::RayKind;
 use crate::measure::rows::{self, LEGEND, Outcome, Row, Run};
 use crate::measure::timing::Workers;
@@ -28,11 +29,13 @@ Examples:
   lanecast bench
   lanecast bench model.ply --rays primary,ao --engines scalar,packet16 --threads 1
   lanecast bench model.ply --size 1024x576 --eye 0,1,5 --look-at 0,1,0 -o results
+  lanecast bench model.ply --peers obvhs,embree --embree libembree4.so.4 --threads 1
 
 Before the clock starts, every engine's hits are compared bit for bit with the scalar engine's, and a sample
 of those with the f64 oracle; a wrong engine gets no figure and the exit code is 1. Engines take turns
 (A B C, A B C, ...) so that a disturbance of the machine falls on all alike. The clock covers traversal of
-packed rays and the writing of hits, nothing else.";
+packed rays and the writing of hits, nothing else. Peers take their turns in the same run; their hits may
+differ from ours by rounding, but one ray in 100000 at most may differ for another reason.";
 
 /// Arguments of `lanecast bench`.
 #[derive(Debug, clap::Args)]
@@ -49,6 +52,12 @@ pub struct BenchArgs {
     /// Engines by name [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     engines: Vec<String>,
+    /// Other tracers to run beside them, on the same rays and threads: obvhs, embree, embree-robust
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Peers")]
+    peers: Vec<String>,
+    /// Embree 4's shared library [default: $LANECAST_EMBREE, else the usual names on the library path]
+    #[arg(long, value_name = "PATH", help_heading = "Peers")]
+    embree: Option<PathBuf>,
     #[command(flatten)]
     camera: CameraArgs,
     #[command(flatten)]
@@ -67,6 +76,12 @@ pub struct BenchArgs {
     pub(super) output: OutputArgs,
 }
 
+impl BenchArgs {
+    fn invitation(&self) -> Invitation {
+        Invitation { names: self.peers.clone(), embree: self.embree.clone() }
+    }
+}
+
 #[derive(serde::Serialize)]
 struct Report<'a> {
     run: &'a Run,
@@ -79,7 +94,9 @@ struct Report<'a> {
 /// Bad input; [`Error::Mismatch`] if an engine is wrong; [`Error::Interrupted`]. What was measured before any of them
 /// is printed and written.
 pub fn run(args: &BenchArgs) -> Result<()> {
-    let workers = Workers::new(args.threads.count())?;
+    args.invitation().check()?;
+    // Peers ask for it, and then our engines get it too.
+    let workers = Workers::new(args.threads.count())?.flushing(!args.peers.is_empty());
     let run = Run::now(workers.threads());
     let facts = env::facts(workers.threads());
     let mut rows = Vec::new();
@@ -159,6 +176,7 @@ fn one<S: Engines>(
         repeat: args.repeat,
         seed: args.seed,
         preset: args.options.preset(),
+        peers: args.invitation(),
     };
     let camera = |bounds| args.camera.choose(description, bounds, size);
     let mut class = "";

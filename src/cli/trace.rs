@@ -13,7 +13,7 @@ use crate::lanes::compiled_isa;
 use crate::measure::answers::Answers;
 use crate::measure::raysets::{Query, split};
 use crate::measure::stats::{Summary, summary};
-use crate::measure::timing::{Series, Workers, interleave};
+use crate::measure::timing::{Series, Tracer, Workers, interleave};
 use crate::ray::Rays;
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
@@ -114,7 +114,7 @@ fn trace<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f3
     let batches = split::<S>(rays);
     let answers = checked(&workers, engine, &world, &batches, args.query)?;
 
-    let mut series = [Series::new(engine, answers)];
+    let mut series = [Series::new(Tracer::Engine(engine), answers)];
     interleave(&workers, &world, &batches, &mut series, (0, args.repeat), &stopped)?;
     let [Series { answers, seconds, .. }] = series;
     if let Some(path) = &args.hits {

@@ -12,6 +12,7 @@
 //! In registers a mask is whatever the machine likes ([`Lanes::Mask`]); everywhere else (memory, calls, counters)
 //! masks are bit masks in a `u32`, bit `i` for lane `i`.
 
+mod ftz;
 mod isa;
 mod pair;
 mod scalar;
@@ -22,6 +23,7 @@ mod vector;
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
+pub use ftz::FlushDenormals;
 pub use isa::{compiled_features, compiled_isa};
 pub use pair::Pair;
 

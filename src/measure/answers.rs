@@ -33,6 +33,14 @@ impl<S: Real> Answers<S> {
         }
     }
 
+    /// Rays answered.
+    pub fn ray_count(&self) -> u64 {
+        match self {
+            Self::Closest(batches) => batches.iter().map(|hits| hits.len() as u64).sum(),
+            Self::Any(batches) => batches.iter().map(|batch| batch.len() as u64).sum(),
+        }
+    }
+
     /// Rays that hit something.
     pub fn hit_count(&self) -> u64 {
         match self {

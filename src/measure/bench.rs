@@ -1,16 +1,16 @@
-//! The bench: engines x ray classes of a scene, checked before the clock starts, then timed interleaved.
-
-use std::collections::BTreeMap;
+//! The bench: engines and peers x ray classes of a scene, checked before the clock starts, then timed interleaved.
 
 use crate::error::{Error, Result};
 use crate::measure::answers::Answers;
 use crate::measure::eye::{Framing, View};
+use crate::measure::peers::check::{Agreement, compare};
+use crate::measure::peers::{Guest, Invitation, Peer};
 use crate::measure::raysets::{RayKind, convert};
-use crate::measure::rows::{Outcome, Row, SceneFacts};
-use crate::measure::stats::{paired_ratio_median, summary};
-use crate::measure::timing::{Series, Workers, interleave};
+use crate::measure::rows::{Outcome, PeerRow, Row, SceneFacts};
+use crate::measure::stats::{median, paired_ratio_median, summary};
+use crate::measure::timing::{Series, Tracer, Workers, interleave};
 use crate::measure::truth;
-use crate::ray::Rays;
+use crate::ray::{Counters, Rays};
 use crate::reference::Oracle;
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::{Preset, World};
@@ -44,15 +44,18 @@ pub struct Plan {
     pub seed: u64,
     /// Tree quality.
     pub preset: Preset,
+    /// Other tracers to run beside them.
+    pub peers: Invitation,
 }
 
 /// Measures one scene; every finished row goes to `report`, class by class.
 ///
 /// An engine whose answers differ from the `scalar` engine's in one bit gets an [`Outcome::Wrong`] row and no figure;
-/// if the oracle rejects the `scalar` engine's answers, so does every engine.
+/// if the oracle rejects the `scalar` engine's answers, so does every engine. Peers may differ as
+/// [`crate::measure::peers::check`] says; one that is missing gets an [`Outcome::Skipped`] row per class.
 ///
 /// # Errors
-/// Unknown engines, those of compiling the world and making the rays; [`Error::Interrupted`] when `stop` says so.
+/// Unknown engines or peers, those of compiling the world and making the rays; [`Error::Interrupted`] when `stop` says so.
 pub fn scene<S: Engines>(
     workers: &Workers,
     description: &Description,
@@ -62,6 +65,7 @@ pub fn scene<S: Engines>(
     report: &mut dyn FnMut(Row),
 ) -> Result<()> {
     let engines = chosen::<S>(&plan.engines)?;
+    plan.peers.check()?;
     let world = workers.install(|| World::<S>::compile(description, plan.preset))?;
     let view = workers.install(|| View::new(&world, description, camera, plan.size, plan.seed))?;
     let oracle = Oracle::new(&world.assembly);
@@ -73,7 +77,8 @@ pub fn scene<S: Engines>(
         build_seconds: stats.build_seconds,
         bytes: stats.node_bytes + stats.prim_bytes,
     };
-    let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines };
+    let guests = plan.peers.open::<S>(&world.assembly, workers)?;
+    let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests };
     for &kind in &plan.kinds {
         let rays = match kind {
             RayKind::Primary => view.primary.clone(),
@@ -95,7 +100,11 @@ struct Subject<'a, S: 'static> {
     oracle: &'a Oracle,
     facts: SceneFacts,
     engines: Vec<&'static dyn Engine<S>>,
+    guests: Vec<Guest<S>>,
 }
+
+/// Answers that may be timed and, for a peer, how they compare with ours.
+type Admission<S> = std::result::Result<(Answers<S>, Agreement), Outcome>;
 
 impl<S: Engines> Subject<'_, S> {
     fn class(
@@ -112,34 +121,108 @@ impl<S: Engines> Subject<'_, S> {
         self.workers.pass(engine::<S>("scalar")?, self.world, batches, &mut scalar);
         let rejected = self.rejected(batches, &scalar, rays);
 
-        let mut outcomes = BTreeMap::new();
-        let mut series = Vec::new();
-        for &engine in &self.engines {
+        let (mut series, mut entries) = (Vec::new(), Vec::new());
+        for tracer in self.tracers() {
             if stop() {
                 return Err(Error::Interrupted);
             }
-            match self.admit(engine, batches, &scalar, rays, rejected.as_deref()) {
-                Ok(answers) => series.push(Series::new(engine, answers)),
-                Err(outcome) => {
-                    outcomes.insert(engine.name(), outcome);
-                }
-            }
+            let admission = match tracer {
+                Tracer::Engine(engine) => self.admit(engine, batches, &scalar, rays, rejected.as_deref()),
+                Tracer::Peer(peer) => self.admit_peer(peer, batches, &scalar),
+            };
+            entries.push(Entry {
+                tracer,
+                place: admission.map(|(answers, agreement)| {
+                    series.push(Series::new(tracer, answers));
+                    (series.len() - 1, agreement)
+                }),
+            });
         }
         interleave(self.workers, self.world, batches, &mut series, (WARM_UP, repeat), stop)?;
-        let baseline = series.iter().find(|s| s.engine.name() == "scalar").map(|s| s.seconds.clone());
-        for one in &series {
-            if let Some(outcome) = self.outcome(one, baseline.as_deref(), batches, kind) {
-                outcomes.insert(one.engine.name(), outcome);
-            }
-        }
-        for &engine in &self.engines {
-            if let Some(outcome) = outcomes.remove(engine.name()) {
-                let (class, precision) = (kind.name(), S::PRECISION);
-                let (scene, engine) = (self.facts.clone(), engine.name());
-                report(Row { scene, class, query: query.name(), engine, precision, rays, outcome });
-            }
-        }
+        self.rows(kind, batches, rays, entries, &series).into_iter().for_each(report);
         Ok(())
+    }
+
+    /// Our engines, then all modes of all peers that are there.
+    fn tracers(&self) -> Vec<Tracer<'_, S>> {
+        let engines = self.engines.iter().map(|&engine| Tracer::Engine(engine));
+        let modes = self.guests.iter().filter_map(|guest| guest.modes.as_ref().ok()).flatten();
+        engines.chain(modes.map(|peer| Tracer::Peer(&**peer))).collect()
+    }
+
+    /// One row per entry, and one for each peer that is missing.
+    fn rows(
+        &self,
+        kind: RayKind,
+        batches: &[Rays<S>],
+        rays: u64,
+        entries: Vec<Entry<'_, S>>,
+        series: &[Series<'_, S>],
+    ) -> Vec<Row> {
+        let of_engines = series.iter().filter(|s| matches!(s.tracer, Tracer::Engine(_)));
+        let scalar = of_engines.clone().find(|s| name(s.tracer) == "scalar").map(|s| &s.seconds[..]);
+        let best = of_engines.min_by(|a, b| mid(a).total_cmp(&mid(b))).map(|s| &s.seconds[..]);
+        let fastest = |name_of_peer: &str| {
+            let modes = (0..series.len()).filter(|&i| name(series[i].tracer) == name_of_peer);
+            modes.min_by(|&a, &b| mid(&series[a]).total_cmp(&mid(&series[b])))
+        };
+        let row = |engine, scene, peer, outcome| {
+            let (class, query, precision) = (kind.name(), kind.query().name(), S::PRECISION);
+            Row { scene, class, query, engine, precision, rays, peer, outcome }
+        };
+        let mut rows = Vec::new();
+        for Entry { tracer, place } in entries {
+            let one = place.as_ref().ok().map(|(place, _)| (&series[*place], *place));
+            let peer = match tracer {
+                Tracer::Engine(_) => None,
+                Tracer::Peer(peer) => Some(PeerRow {
+                    mode: peer.facts().mode,
+                    description: peer.facts().description.clone(),
+                    quoted: one.is_none_or(|(_, place)| fastest(peer.facts().name) == Some(place)),
+                    ties: place.as_ref().map_or(0, |(_, agreement)| agreement.ties),
+                    differences: place.as_ref().map_or(0, |(_, agreement)| agreement.differences),
+                    lead: one.and_then(|(one, _)| paired_ratio_median(&one.seconds, best?)),
+                }),
+            };
+            let outcome = match place {
+                Ok((place, _)) => self.outcome(&series[place], scalar, batches, kind),
+                Err(outcome) => Some(outcome),
+            };
+            rows.extend(outcome.map(|outcome| row(name(tracer), self.facts_of(tracer), peer, outcome)));
+        }
+        for guest in &self.guests {
+            if let Err(why) = &guest.modes {
+                let peer = PeerRow { quoted: true, ..Default::default() };
+                let scene = SceneFacts { build_seconds: 0.0, bytes: 0, ..self.facts.clone() };
+                rows.push(row(guest.name, scene, Some(peer), Outcome::Skipped(why.clone())));
+            }
+        }
+        rows
+    }
+
+    /// The scene's facts, with the build time and memory of whoever traces it.
+    fn facts_of(&self, tracer: Tracer<'_, S>) -> SceneFacts {
+        match tracer {
+            Tracer::Engine(_) => self.facts.clone(),
+            Tracer::Peer(peer) => {
+                let (build_seconds, bytes) = (peer.facts().build_seconds, peer.facts().bytes);
+                SceneFacts { build_seconds, bytes, ..self.facts.clone() }
+            }
+        }
+    }
+
+    /// A peer's answers, if all but a handful are ours up to rounding.
+    fn admit_peer(&self, peer: &dyn Peer<S>, batches: &[Rays<S>], scalar: &Answers<S>) -> Admission<S> {
+        let mut answers = scalar.clone();
+        self.workers.peer_pass(peer, batches, &mut answers);
+        let agreement = compare(scalar, &answers);
+        match &agreement.first {
+            Some(first) if !agreement.passes() => {
+                let (count, rays) = (agreement.differences, agreement.rays);
+                Err(Outcome::Wrong(format!("{count} of {rays} rays differ from scalar, {first}")))
+            }
+            _ => Ok((answers, agreement)),
+        }
     }
 
     /// The oracle's objection to a sample of the `scalar` engine's answers.
@@ -163,7 +246,7 @@ impl<S: Engines> Subject<'_, S> {
         scalar: &Answers<S>,
         rays: u64,
         rejected: Option<&str>,
-    ) -> std::result::Result<Answers<S>, Outcome> {
+    ) -> Admission<S> {
         let tests = rays.saturating_mul(self.world.assembly.instanced_prims());
         if engine.name() == "brute" && tests > BRUTE_LIMIT {
             return Err(Outcome::Skipped(format!("{tests} ray-primitive tests per pass, limit {BRUTE_LIMIT}")));
@@ -174,7 +257,7 @@ impl<S: Engines> Subject<'_, S> {
         let mut answers = scalar.clone();
         self.workers.pass(engine, self.world, batches, &mut answers);
         match answers.difference(scalar) {
-            None => Ok(answers),
+            None => Ok((answers, Agreement::default())),
             Some(d) => Err(Outcome::Wrong(format!("{} rays differ from scalar, ray {}: {}", d.count, d.first, d.text))),
         }
     }
@@ -187,7 +270,10 @@ impl<S: Engines> Subject<'_, S> {
         kind: RayKind,
     ) -> Option<Outcome> {
         let seconds = summary(&one.seconds)?;
-        let counters = self.workers.count(one.engine, self.world, batches, kind.query());
+        let counters = match one.tracer {
+            Tracer::Engine(engine) => self.workers.count(engine, self.world, batches, kind.query()),
+            Tracer::Peer(_) => Counters::default(),
+        };
         let lane_use = |active: u64, total: u64| (total > 0).then(|| active as f64 / total as f64);
         Some(Outcome::Timed {
             seconds,
@@ -199,4 +285,22 @@ impl<S: Engines> Subject<'_, S> {
             prim_lane_use: lane_use(counters.prim_lanes_active, counters.prim_lanes_total),
         })
     }
+}
+
+/// One tracer's place among the series with how its answers compare, or why it has none.
+struct Entry<'a, S> {
+    tracer: Tracer<'a, S>,
+    place: std::result::Result<(usize, Agreement), Outcome>,
+}
+
+fn name<S: Engines>(tracer: Tracer<'_, S>) -> &'static str {
+    match tracer {
+        Tracer::Engine(engine) => engine.name(),
+        Tracer::Peer(peer) => peer.facts().name,
+    }
+}
+
+/// Median seconds; infinite without passes.
+fn mid<S>(series: &Series<'_, S>) -> f64 {
+    median(&series.seconds).unwrap_or(f64::INFINITY)
 }

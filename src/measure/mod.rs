@@ -4,6 +4,7 @@ pub mod answers;
 pub mod bench;
 pub mod env;
 pub mod eye;
+pub mod peers;
 pub mod raysets;
 pub mod rows;
 pub mod stats;

@@ -79,6 +79,23 @@ pub enum Outcome {
     Wrong(String),
 }
 
+/// What is said of a peer beside its figures.
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct PeerRow {
+    /// How it was called; empty if there is one way only.
+    pub mode: &'static str,
+    /// Version, tree and settings.
+    pub description: String,
+    /// The fastest mode of this peer in this class: the one to compare with.
+    pub quoted: bool,
+    /// Rays with our t and another primitive: shared edges, coincident surfaces.
+    pub ties: u64,
+    /// Rays with another answer (few, or there would be no figure).
+    pub differences: u64,
+    /// Times as fast as this peer our fastest engine is, pass by pass.
+    pub lead: Option<f64>,
+}
+
 /// One row.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Row {
@@ -88,12 +105,14 @@ pub struct Row {
     pub class: &'static str,
     /// `closest` or `any`.
     pub query: &'static str,
-    /// Engine.
+    /// Engine or peer.
     pub engine: &'static str,
     /// `f32` or `f64`.
     pub precision: &'static str,
     /// Rays in the set, dead ones included.
     pub rays: u64,
+    /// What only peers have.
+    pub peer: Option<PeerRow>,
     /// The rest.
     pub outcome: Outcome,
 }
@@ -107,7 +126,8 @@ impl Row {
 
 const COLUMNS: &str = "revision,date,cpu,isa,flags,threads,scene,scene_hash,prims,class,query,engine,precision,rays,\
     status,hits,repeat,best_mrays_per_s,median_mrays_per_s,spread,mad_seconds,ratio_to_scalar,node_lane_use,\
-    prim_lane_use,checksum,build_seconds,bytes,command";
+    prim_lane_use,checksum,build_seconds,bytes,peer_mode,peer_description,quoted,ties,differences,ours_over_peer,\
+    command";
 
 /// The file: a header line and one line per row, RFC 4180 quoting, lines end in LF.
 pub fn csv(run: &Run, rows: &[Row]) -> String {
@@ -137,7 +157,14 @@ fn line(run: &Run, row: &Row) -> String {
         Outcome::Skipped(why) => cells.extend(without_figures(format!("skipped: {why}"))),
         Outcome::Wrong(why) => cells.extend(without_figures(format!("wrong: {why}"))),
     }
-    cells.extend([format!("{:.6}", scene.build_seconds), scene.bytes.to_string(), run.command.clone()]);
+    cells.extend([format!("{:.6}", scene.build_seconds), scene.bytes.to_string()]);
+    cells.extend(row.peer.as_ref().map_or_else(Default::default, |peer| {
+        let counts = [peer.ties, peer.differences].map(|n| n.to_string());
+        let [ties, differences] = counts;
+        let mode = peer.mode.to_string();
+        [mode, peer.description.clone(), peer.quoted.to_string(), ties, differences, optional(&peer.lead)]
+    }));
+    cells.push(run.command.clone());
     cells.iter().map(|c| quoted(c)).collect::<Vec<_>>().join(",")
 }
 
@@ -151,26 +178,29 @@ fn quoted(cell: &str) -> String {
     if cell.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.into() }
 }
 
-/// The rows as an aligned table for people, one block per scene.
+/// The rows as an aligned table for people, one block per scene. Of a peer's modes only the fastest is shown.
 pub fn table(rows: &[Row]) -> String {
+    let shown: Vec<&Row> = rows.iter().filter(|row| row.peer.as_ref().is_none_or(|peer| peer.quoted)).collect();
+    let width = shown.iter().map(|row| label(row).len()).max().unwrap_or(0).max("engine".len());
     let mut text = String::new();
     let mut scene = None;
-    for row in rows {
+    for row in shown {
         if scene != Some(&row.scene.name) {
             scene = Some(&row.scene.name);
-            text.push_str(&heading(&row.scene));
+            text.push_str(&heading(&row.scene, width));
         }
-        let what = format!("{:<8} {:<7} {:<10} {}", row.class, row.query, row.engine, row.precision);
+        let what = format!("{:<8} {:<7} {:<width$} {}", row.class, row.query, label(row), row.precision);
         let figures = match &row.outcome {
             Outcome::Timed { seconds, hits, ratio, node_lane_use, prim_lane_use, .. } => format!(
-                "{:>9.2} {:>9.2} {:>6.1}% {:>8} {:>7} {:>7} {:>10}",
+                "{:>9.2} {:>9.2} {:>6.1}% {:>8} {:>7} {:>7} {:>10}{}",
                 row.mrays(seconds.median),
                 row.mrays(seconds.min),
                 100.0 * seconds.spread,
-                ratio.map_or("-".into(), |r| format!("{r:.2}x")),
+                times(*ratio),
                 percent(*node_lane_use),
                 percent(*prim_lane_use),
-                hits
+                hits,
+                row.peer.as_ref().map_or(String::new(), beside),
             ),
             Outcome::Skipped(why) => format!("  skipped: {why}"),
             Outcome::Wrong(why) => format!("  WRONG: {why}"),
@@ -180,10 +210,23 @@ pub fn table(rows: &[Row]) -> String {
     text
 }
 
-fn heading(scene: &SceneFacts) -> String {
+fn label(row: &Row) -> String {
+    match &row.peer {
+        Some(peer) if !peer.mode.is_empty() => format!("{} [{}]", row.engine, peer.mode),
+        _ => row.engine.into(),
+    }
+}
+
+/// The columns that only peers have.
+fn beside(peer: &PeerRow) -> String {
+    format!(" {:>9} {:>7} {:>6}", times(peer.lead), peer.ties, peer.differences)
+}
+
+fn heading(scene: &SceneFacts, width: usize) -> String {
     let mib = scene.bytes as f64 / f64::from(1 << 20);
     format!(
-        "{}: {} primitives, built in {:.3} s, {mib:.1} MiB\n  {:<8} {:<7} {:<10} {:<3} {:>9} {:>9} {:>7} {:>8} {:>7} {:>7} {:>10}\n",
+        "{}: {} primitives, built in {:.3} s, {mib:.1} MiB\n  {:<8} {:<7} {:<width$} {:<3} {:>9} {:>9} {:>7} {:>8} {:>7} \
+         {:>7} {:>10} {:>9} {:>7} {:>6}\n",
         scene.name,
         scene.prims,
         scene.build_seconds,
@@ -197,8 +240,15 @@ fn heading(scene: &SceneFacts) -> String {
         "scalar",
         "node",
         "prim",
-        "hits"
+        "hits",
+        "ours/peer",
+        "ties",
+        "differ",
     )
+}
+
+fn times(ratio: Option<f64>) -> String {
+    ratio.map_or("-".into(), |r| format!("{r:.2}x"))
 }
 
 fn percent(use_of_lanes: Option<f64>) -> String {
@@ -207,7 +257,9 @@ fn percent(use_of_lanes: Option<f64>) -> String {
 
 /// How to read [`table`].
 pub const LEGEND: &str = "median, best: million rays per second; spread: (slowest - fastest) / median pass;\n\
-    scalar: times as fast as the scalar engine, pass by pass; node, prim: lanes used in node and primitive tests.\n";
+    scalar: times as fast as the scalar engine, pass by pass; node, prim: lanes used in node and primitive tests;\n\
+    ours/peer: times as fast as the peer (in its fastest mode) our fastest engine is, pass by pass;\n\
+    ties: rays with our distance and another primitive; differ: rays with another answer.\n";
 
 #[cfg(test)]
 mod tests {
@@ -217,7 +269,16 @@ mod tests {
     fn row(outcome: Outcome) -> Row {
         let scene =
             SceneFacts { name: "a, \"b\"".into(), hash: "00ff".into(), prims: 12, build_seconds: 0.25, bytes: 1 << 20 };
-        Row { scene, class: "primary", query: "closest", engine: "packet4", precision: "f32", rays: 2_000_000, outcome }
+        Row {
+            scene,
+            class: "primary",
+            query: "closest",
+            engine: "packet4",
+            precision: "f32",
+            rays: 2_000_000,
+            peer: None,
+            outcome,
+        }
     }
 
     fn timed() -> Row {
@@ -286,5 +347,20 @@ mod tests {
         assert_eq!(text.lines().count(), 4, "{text}");
         assert!(text.contains("2.00      4.00   50.0%    2.00x     50%       -"), "{text}");
         assert!(text.contains("WRONG: 3 rays"), "{text}");
+    }
+
+    fn peer(mode: &'static str, quoted: bool) -> Row {
+        let peer = PeerRow { mode, quoted, ties: 5, differences: 1, lead: Some(1.5), ..Default::default() };
+        Row { engine: "embree", peer: Some(peer), ..timed() }
+    }
+
+    #[test]
+    fn every_mode_of_a_peer_is_kept_and_the_fastest_shown() {
+        let rows = [peer("8 coherent", false), peer("16 coherent", true)];
+        let text = table(&rows);
+        assert_eq!(text.lines().count(), 3, "{text}");
+        assert!(text.contains("embree [16 coherent]") && text.contains("1.50x       5      1"), "{text}");
+        let csv = csv(&run(), &rows);
+        assert!(csv.contains(",8 coherent,,false,5,1,1.5000,") && csv.contains(",16 coherent,,true,"), "{csv}");
     }
 }

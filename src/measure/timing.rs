@@ -3,6 +3,8 @@
 //! A pass covers traversal and the writing of hits to memory, nothing else: files are read, trees built, rays packed
 //! and answers allocated before. Threads take batches from a work-stealing pool, each with its own [`Scratch`], and
 //! each is pinned to one core where the system allows it.
+//!
+//! Peers run on the same threads by the same rule. Their rays are packed anew before each pass, outside the clock.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -10,8 +12,9 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::lanes::Real;
+use crate::lanes::{FlushDenormals, Real};
 use crate::measure::answers::Answers;
+use crate::measure::peers::{Peer, rename};
 use crate::measure::raysets::Query;
 use crate::ray::{Counters, Hits, Rays};
 use crate::scene::world::World;
@@ -24,6 +27,7 @@ pub const MAX_THREADS: usize = 1024;
 pub struct Workers {
     pool: rayon::ThreadPool,
     scratches: Vec<Mutex<Scratch>>,
+    flushing: bool,
 }
 
 impl Workers {
@@ -48,7 +52,14 @@ impl Workers {
             .build()
             .map_err(|e| Error::Usage(format!("cannot start {threads} threads: {e}")))?;
         let scratches = (0..pool.current_num_threads()).map(|_| Mutex::default()).collect();
-        Ok(Self { pool, scratches })
+        Ok(Self { pool, scratches, flushing: false })
+    }
+
+    /// Whether denormal numbers count as zero during passes, of engines and peers alike: what peers ask for.
+    #[must_use]
+    pub fn flushing(mut self, on: bool) -> Self {
+        self.flushing = on;
+        self
     }
 
     /// Number of threads.
@@ -70,38 +81,51 @@ impl Workers {
         batches: &[Rays<S>],
         answers: &mut Answers<S>,
     ) -> f64 {
-        self.pool.install(|| {
-            let start = Instant::now();
-            match answers {
-                Answers::Closest(out) => self.each(batches, out, |rays, hits: &mut Hits<S>, scratch| {
-                    engine.intersect(world, rays, hits, scratch, None);
-                }),
-                Answers::Any(out) => self.each(batches, out, |rays, flags: &mut Vec<u8>, scratch| {
-                    engine.occluded(world, rays, flags, scratch, None);
-                }),
-            }
-            start.elapsed().as_secs_f64()
+        self.pool.install(|| match answers {
+            Answers::Closest(out) => self.timed(jobs(batches, out), |(rays, hits), scratch| {
+                engine.intersect(world, rays, hits, scratch, None);
+            }),
+            Answers::Any(out) => self.timed(jobs(batches, out), |(rays, flags), scratch| {
+                engine.occluded(world, rays, flags, scratch, None);
+            }),
         })
     }
 
-    /// Every batch with its output slot and the scratch of the thread that takes it.
-    fn each<S: Real, O: Send>(
-        &self,
-        batches: &[Rays<S>],
-        out: &mut [O],
-        work: impl Fn(&Rays<S>, &mut O, &mut Scratch) + Sync,
-    ) {
-        let one = |(rays, slot): (&Rays<S>, &mut O)| {
+    /// One timed pass of a peer, with rays packed before and primitives renamed after the clock; see
+    /// [`Workers::pass`].
+    pub fn peer_pass<S: Real>(&self, peer: &dyn Peer<S>, batches: &[Rays<S>], answers: &mut Answers<S>) -> f64 {
+        self.pool.install(|| match answers {
+            Answers::Closest(out) => {
+                let pack = |(rays, hits)| (peer.pack(rays, Query::Closest), hits);
+                let packed = batches.par_iter().zip(&mut *out).map(pack).collect();
+                let seconds = self.timed(packed, |(packed, hits): &mut (_, &mut _), _| packed.intersect(hits));
+                out.par_iter_mut().for_each(|hits| rename(peer.ids(), hits));
+                seconds
+            }
+            Answers::Any(out) => {
+                let pack = |(rays, flags)| (peer.pack(rays, Query::Any), flags);
+                let packed = batches.par_iter().zip(out).map(pack).collect();
+                self.timed(packed, |(packed, flags): &mut (_, &mut _), _| packed.occluded(flags))
+            }
+        })
+    }
+
+    /// Seconds of doing all `jobs`, each with the scratch of the thread that takes it.
+    fn timed<T: Send>(&self, mut jobs: Vec<T>, work: impl Fn(&mut T, &mut Scratch) + Sync) -> f64 {
+        let start = Instant::now();
+        let one = |job: &mut T| {
+            let _flushed = self.flushing.then(FlushDenormals::new);
             let thread = rayon::current_thread_index().unwrap_or(0);
             // Only this thread ever takes this lock, so it is free: about 20 ns per batch.
             let mut scratch = self.scratches[thread].lock().unwrap_or_else(PoisonError::into_inner);
-            work(rays, slot, &mut scratch);
+            work(job, &mut scratch);
         };
         if self.threads() == 1 {
-            batches.iter().zip(out).for_each(one);
+            jobs.iter_mut().for_each(one);
         } else {
-            batches.par_iter().zip(out).for_each(one);
+            jobs.par_iter_mut().for_each(one);
         }
+        start.elapsed().as_secs_f64()
     }
 
     /// One untimed pass of the counting build of the engine.
@@ -124,10 +148,34 @@ impl Workers {
     }
 }
 
-/// One engine on one list of batches, with what its passes took.
+/// Every batch with its output slot.
+fn jobs<'a, S, O>(batches: &'a [Rays<S>], out: &'a mut [O]) -> Vec<(&'a Rays<S>, &'a mut O)> {
+    batches.iter().zip(out).collect()
+}
+
+/// Who is timed.
+#[derive(Clone, Copy)]
+pub enum Tracer<'a, S> {
+    /// One of our engines.
+    Engine(&'a dyn Engine<S>),
+    /// Another tracer.
+    Peer(&'a dyn Peer<S>),
+}
+
+impl<S: Real> Tracer<'_, S> {
+    /// One timed pass, see [`Workers::pass`].
+    pub fn pass(self, workers: &Workers, world: &World<S>, batches: &[Rays<S>], answers: &mut Answers<S>) -> f64 {
+        match self {
+            Self::Engine(engine) => workers.pass(engine, world, batches, answers),
+            Self::Peer(peer) => workers.peer_pass(peer, batches, answers),
+        }
+    }
+}
+
+/// One tracer on one list of batches, with what its passes took.
 pub struct Series<'a, S> {
-    /// The engine.
-    pub engine: &'a dyn Engine<S>,
+    /// Who traces.
+    pub tracer: Tracer<'a, S>,
     /// Answers of the last pass.
     pub answers: Answers<S>,
     /// Seconds of each timed pass, in the order they ran.
@@ -136,13 +184,13 @@ pub struct Series<'a, S> {
 
 impl<'a, S: Real> Series<'a, S> {
     /// A series without passes, holding the answers that were checked.
-    pub fn new(engine: &'a dyn Engine<S>, answers: Answers<S>) -> Self {
-        Self { engine, answers, seconds: Vec::new() }
+    pub fn new(tracer: Tracer<'a, S>, answers: Answers<S>) -> Self {
+        Self { tracer, answers, seconds: Vec::new() }
     }
 }
 
 /// Times all `series` interleaved (A B C, A B C, ...): `warm_up` rounds that are thrown away, then `repeat` rounds.
-/// A disturbance of the machine then falls on all engines alike. `stop` is asked before every pass.
+/// A disturbance of the machine then falls on all alike. `stop` is asked before every pass.
 ///
 /// # Errors
 /// [`Error::Interrupted`] when `stop` says so.
@@ -159,7 +207,7 @@ pub fn interleave<S: Real>(
             if stop() {
                 return Err(Error::Interrupted);
             }
-            let seconds = workers.pass(one.engine, world, batches, &mut one.answers);
+            let seconds = one.tracer.pass(workers, world, batches, &mut one.answers);
             if round >= warm_up {
                 one.seconds.push(seconds);
             }
@@ -200,7 +248,7 @@ mod tests {
         let engines = [Slab::named("A", &order), Slab::named("B", &order)];
         let workers = Workers::new(1).unwrap();
         let empty = Answers::new(Query::Closest, &batches);
-        let mut series: Vec<_> = engines.iter().map(|e| Series::new(e, empty.clone())).collect();
+        let mut series: Vec<_> = engines.iter().map(|e| Series::new(Tracer::Engine(e), empty.clone())).collect();
         interleave(&workers, &world, &batches, &mut series, (1, 3), &|| false).unwrap();
         assert_eq!(series.iter().map(|s| s.seconds.len()).collect::<Vec<_>>(), [3, 3]);
         drop(series);
@@ -211,7 +259,7 @@ mod tests {
     fn stops_before_the_next_pass() {
         let (world, batches) = (empty_world::<f64>(), falling_rays::<f64>(&[16]));
         let engine = Slab::default();
-        let mut series = [Series::new(&engine, Answers::new(Query::Any, &batches))];
+        let mut series = [Series::new(Tracer::Engine(&engine), Answers::new(Query::Any, &batches))];
         let asked = AtomicU32::new(0);
         let stop = || asked.fetch_add(1, Ordering::Relaxed) == 2;
         let result = interleave(&Workers::new(1).unwrap(), &world, &batches, &mut series, (0, 10), &stop);

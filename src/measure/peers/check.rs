@@ -1,0 +1,122 @@
+//! Whether a peer found what our engines found, up to rounding.
+//!
+//! Two correct tracers with different arithmetic agree on t within a small relative error and on the primitive,
+//! except where surfaces share an edge or coincide. Where a triangle is seen edge-on, or a tracer is not watertight,
+//! they may differ entirely; such rays are counted and there may only be a handful.
+
+use crate::lanes::Real;
+use crate::measure::answers::Answers;
+use crate::ray::Hits;
+
+/// Largest relative difference of t between two answers that are the same.
+pub const TOLERANCE: f64 = 1e-4;
+
+/// Largest share of rays that may differ in a row that gets a figure.
+pub const MAX_DIFFERING: f64 = 1e-5;
+
+/// How a peer's answers compare with ours.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Agreement {
+    /// Rays compared.
+    pub rays: u64,
+    /// Same t, another primitive: shared edges, coincident surfaces.
+    pub ties: u64,
+    /// Another t, or a hit against a miss.
+    pub differences: u64,
+    /// The first difference in words.
+    pub first: Option<String>,
+}
+
+impl Agreement {
+    /// Whether a figure may be quoted.
+    pub fn passes(&self) -> bool {
+        self.differences as f64 <= MAX_DIFFERING * self.rays as f64
+    }
+}
+
+/// Compares a peer's answers with ours, ray by ray; answers to different queries differ in every ray.
+pub fn compare<S: Real>(ours: &Answers<S>, theirs: &Answers<S>) -> Agreement {
+    let mut result = Agreement::default();
+    match (ours, theirs) {
+        (Answers::Closest(a), Answers::Closest(b)) => {
+            for (a, b) in a.iter().zip(b) {
+                (0..a.len().min(b.len())).for_each(|i| result.closest(a, b, i));
+            }
+        }
+        (Answers::Any(a), Answers::Any(b)) => {
+            for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
+                result.count(a == b, || format!("occluded: {a} against {b}"));
+            }
+        }
+        _ => {}
+    }
+    let rays = ours.ray_count();
+    let missing = rays.max(theirs.ray_count()) - result.rays;
+    Agreement { rays: result.rays + missing, differences: result.differences + missing, ..result }
+}
+
+impl Agreement {
+    fn closest<S: Real>(&mut self, a: &Hits<S>, b: &Hits<S>, i: usize) {
+        let (hit, t) = ([a.is_hit(i), b.is_hit(i)], [a.t[i].to_f64(), b.t[i].to_f64()]);
+        let near = (t[0] - t[1]).abs() <= TOLERANCE * t[0].abs().max(t[1].abs());
+        let same = hit == [false; 2] || hit == [true; 2] && near;
+        self.ties += u64::from(same && (a.prim[i], a.inst[i]) != (b.prim[i], b.inst[i]));
+        self.count(same, || {
+            let one = |h: &Hits<S>| match h.is_hit(i) {
+                true => format!("t {} prim {} inst {}", h.t[i].to_f64(), h.prim[i], h.inst[i]),
+                false => "a miss".into(),
+            };
+            format!("{} against {}", one(a), one(b))
+        });
+    }
+
+    fn count(&mut self, same: bool, text: impl FnOnce() -> String) {
+        if !same {
+            self.differences += 1;
+            let number = self.rays;
+            self.first.get_or_insert_with(|| format!("ray {number}: {}", text()));
+        }
+        self.rays += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hits(list: &[(f32, u32)]) -> Answers<f32> {
+        let mut hits = Hits::new(list.len());
+        for (i, &(t, prim)) in list.iter().enumerate() {
+            if t.is_finite() {
+                (hits.t[i], hits.prim[i], hits.inst[i]) = (t, prim, 0);
+            }
+        }
+        Answers::Closest(vec![hits])
+    }
+
+    const MISS: (f32, u32) = (f32::INFINITY, 0);
+
+    #[test]
+    fn ties_and_differences_are_told_apart() {
+        let ours = hits(&[(1.0, 1), (1.0, 1), (1.0, 1), MISS, MISS, (1000.0, 1)]);
+        let theirs = hits(&[(1.00005, 1), (1.0, 2), (1.001, 1), MISS, (1.0, 1), (1000.05, 1)]);
+        let agreement = compare(&ours, &theirs);
+        assert_eq!((agreement.rays, agreement.ties, agreement.differences), (6, 1, 2));
+        assert!(agreement.first.as_ref().is_some_and(|text| text.contains("ray 2: t 1 prim 1")), "{agreement:?}");
+        assert!(!agreement.passes());
+    }
+
+    #[test]
+    fn one_ray_in_a_hundred_thousand_may_differ() {
+        let at = |differences| Agreement { rays: 200_000, differences, ..Default::default() };
+        assert!(at(0).passes() && at(2).passes() && !at(3).passes());
+    }
+
+    #[test]
+    fn flags_and_missing_answers_count() {
+        let any = |flags: &[u8]| Answers::<f32>::Any(vec![flags.to_vec()]);
+        assert_eq!(compare(&any(&[0, 1, 1]), &any(&[0, 1, 0])).differences, 1);
+        assert_eq!(compare(&any(&[0, 1, 1]), &any(&[0])).differences, 2);
+        assert_eq!(compare(&any(&[0, 1, 1]), &hits(&[MISS])).differences, 3);
+    }
+}

@@ -1,0 +1,137 @@
+//! Peers: other ray tracers on the same triangles, the same rays and the same threads as our engines.
+//!
+//! A peer gets every advantage its authors ask for: its best tree, its own ray layout filled before the clock starts,
+//! denormals flushed, and of its modes the best one is quoted. What the clock covers is the same as for an engine:
+//! traversal of packed rays and the writing of t, u, v and primitive. A peer's own primitive numbers become ours after
+//! the clock has stopped, so that no look-up of ours is counted against it.
+
+pub mod check;
+pub mod embree;
+pub mod obvhs;
+pub mod triangles;
+
+use std::any::Any;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::error::{Error, Result, nearest_name};
+use crate::lanes::Real;
+use crate::measure::raysets::Query;
+use crate::measure::timing::Workers;
+use crate::ray::{Hits, Rays};
+use crate::scene::assembly::Assembly;
+use triangles::WorldTriangles;
+
+/// What `--peers` takes.
+pub const NAMES: [&str; 3] = ["obvhs", "embree", "embree-robust"];
+
+/// What a row says about a peer.
+#[derive(Clone, Debug, Default)]
+pub struct Facts {
+    /// Its family: rows with one name and different modes are one peer, and the best of them is quoted.
+    pub name: &'static str,
+    /// How it is called, empty if there is one way only.
+    pub mode: &'static str,
+    /// Version, tree and settings, in words.
+    pub description: String,
+    /// Wall-clock seconds of building its tree from triangles in memory.
+    pub build_seconds: f64,
+    /// Bytes of its tree and triangles after the build.
+    pub bytes: u64,
+}
+
+/// Another tracer in one mode, with its scene built.
+pub trait Peer<S>: Send + Sync {
+    /// What it is.
+    fn facts(&self) -> &Facts;
+    /// The rays of one batch in the peer's own layout, ready for `query`; not under the clock.
+    fn pack<'a>(&'a self, rays: &Rays<S>, query: Query) -> Box<dyn Packed<S> + 'a>;
+    /// Our primitive and instance number for each of the peer's primitive numbers.
+    fn ids(&self) -> &[[u32; 2]];
+}
+
+/// One batch in a peer's own ray layout. Rays may be used up by a call, as Embree's are: one call per packing.
+pub trait Packed<S>: Send {
+    /// Closest hits, with the peer's own number in `prim` and 0 in `inst`; see [`rename`].
+    fn intersect(&mut self, hits: &mut Hits<S>);
+    /// 1 for each ray whose segment holds something, else 0.
+    fn occluded(&mut self, out: &mut Vec<u8>);
+}
+
+/// Turns a peer's primitive numbers into ours.
+pub fn rename<S: Real>(ids: &[[u32; 2]], hits: &mut Hits<S>) {
+    for i in 0..hits.len() {
+        if hits.is_hit(i)
+            && let Some(&[prim, inst]) = ids.get(hits.prim[i] as usize)
+        {
+            (hits.prim[i], hits.inst[i]) = (prim, inst);
+        }
+    }
+}
+
+/// A peer that was asked for: its modes, or why there are none.
+pub struct Guest<S> {
+    /// Family, for the row that says what is missing.
+    pub name: &'static str,
+    /// One peer per mode.
+    pub modes: std::result::Result<Vec<Box<dyn Peer<S>>>, String>,
+}
+
+/// Peers to invite.
+#[derive(Clone, Debug, Default)]
+pub struct Invitation {
+    /// Names from [`NAMES`].
+    pub names: Vec<String>,
+    /// Embree's shared library; `None`: see [`embree::candidates`].
+    pub embree: Option<PathBuf>,
+}
+
+impl Invitation {
+    /// # Errors
+    /// A usage error for an unknown name.
+    pub fn check(&self) -> Result<()> {
+        let unknown = self.names.iter().find(|name| !NAMES.contains(&name.as_str()));
+        unknown.map_or(Ok(()), |name| {
+            let near = nearest_name(name, NAMES).map(|n| format!(" (did you mean `{n}`?)")).unwrap_or_default();
+            Err(Error::Usage(format!("no peer `{name}`{near}; there are: {}", NAMES.join(", "))))
+        })
+    }
+
+    /// Builds every peer's scene from the triangles of `assembly`, with as many threads as `workers` has. To be called
+    /// from a thread that is not pinned to a core: Embree's build threads inherit where they may run.
+    ///
+    /// # Errors
+    /// Those of [`Invitation::check`]. A peer that cannot take part is no error but a [`Guest`] that says why.
+    pub fn open<S: Real>(&self, assembly: &Assembly, workers: &Workers) -> Result<Vec<Guest<S>>> {
+        self.check()?;
+        if self.names.is_empty() {
+            return Ok(Vec::new());
+        }
+        let triangles = WorldTriangles::flatten(assembly).map(Arc::new);
+        let mut guests = Vec::new();
+        for name in &self.names {
+            let (families, build): (&[&'static str], _) = match name.as_str() {
+                "obvhs" => (&obvhs::NAMES, None),
+                "embree" => (&["embree"], Some(false)),
+                _ => (&["embree-robust"], Some(true)),
+            };
+            for &family in families {
+                let modes = triangles.clone().and_then(|triangles| match build {
+                    None => workers.install(|| obvhs::build(family, &triangles)).map(|peer| vec![peer]),
+                    Some(robust) => embree::open(self.embree.as_deref(), triangles, workers.threads(), robust),
+                });
+                guests.push(Guest { name: family, modes: modes.and_then(of_precision) });
+            }
+        }
+        Ok(guests)
+    }
+}
+
+/// Peers compute in f32: as peers of precision `S`, if `S` is that.
+fn of_precision<S: Real>(peers: Vec<Box<dyn Peer<f32>>>) -> std::result::Result<Vec<Box<dyn Peer<S>>>, String> {
+    let any: Box<dyn Any> = Box::new(peers);
+    any.downcast().map(|peers| *peers).map_err(|_| "computes in f32 only (--precision f32)".into())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,169 @@
+//! Peers against our scalar engine on a soup under two instances; what is said of peers that are not there.
+
+use std::path::PathBuf;
+
+use glam::{DAffine3, DVec3};
+
+use super::check::compare;
+use super::*;
+use crate::measure::answers::Answers;
+use crate::scene::description::{Description, Group, Item, ItemKind};
+use crate::scene::mesh::Mesh;
+use crate::scene::world::{Preset, World};
+use crate::trace::engine;
+
+/// splitmix64 (Steele, Lea, Flood, 2014), as numbers in [-1, 1).
+struct Random(u64);
+
+impl Random {
+    fn number(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    fn point(&mut self) -> DVec3 {
+        DVec3::new(self.number(), self.number(), self.number())
+    }
+}
+
+/// 3000 triangles, once as they are and once turned, moved and scaled.
+fn soup() -> Description {
+    let (mut random, mut mesh) = (Random(1), Mesh::default());
+    for i in 0..3000 {
+        let centre = random.point() * 4.0;
+        mesh.positions.extend([0; 3].map(|_| (centre + random.point() * 0.4).as_vec3().as_dvec3()));
+        mesh.triangles.push([0, 1, 2].map(|k| 3 * i + k));
+    }
+    let item = |kind, transform| Item { transform, material: None, kind };
+    let mut scene = Description::new("soup");
+    scene.meshes.push(Arc::new(mesh));
+    let moved = DAffine3::from_rotation_y(1.0) * DAffine3::from_translation(DVec3::X * 3.0);
+    scene.groups = vec![Group::default(), Group::default()];
+    scene.groups[0].items =
+        vec![item(ItemKind::Mesh(0), DAffine3::from_scale(DVec3::splat(0.5))), item(ItemKind::Instance(1), moved)];
+    scene.groups[1].items = vec![item(ItemKind::Mesh(0), DAffine3::IDENTITY)];
+    scene
+}
+
+/// Rays of several lengths and batch sizes, every seventh dead.
+fn rays() -> Vec<Rays<f32>> {
+    let mut random = Random(2);
+    let mut batch = |size: usize| {
+        let mut rays = Rays::new(size);
+        for i in (0..size).filter(|i| i % 7 != 3) {
+            let (org, target) = (random.point() * 9.0, random.point() * 3.0);
+            let end = if i % 3 == 0 { 0.7 } else { f32::INFINITY };
+            rays.set(i, org.as_vec3().into(), (target - org).as_vec3().into(), 0.05, end);
+        }
+        rays
+    };
+    [1024, 1, 1023, 1000, 37].into_iter().map(&mut batch).collect()
+}
+
+/// Both queries of every peer against scalar; returns how many peers there were.
+fn agree_on_the_soup(invitation: &Invitation, threads: usize) -> std::result::Result<usize, String> {
+    let workers = Workers::new(threads).unwrap().flushing(true);
+    let (world, batches) = (World::<f32>::compile(&soup(), Preset::Fast).unwrap(), rays());
+    let scalar = engine::<f32>("scalar").unwrap();
+    let mut count = 0;
+    for guest in invitation.open::<f32>(&world.assembly, &workers).unwrap() {
+        for peer in guest.modes? {
+            let what = format!("{} {}", peer.facts().name, peer.facts().mode);
+            assert!(peer.facts().bytes > 100_000 && peer.facts().build_seconds > 0.0, "{what}: {:?}", peer.facts());
+            for query in [Query::Closest, Query::Any] {
+                let mut ours = Answers::new(query, &batches);
+                workers.pass(scalar, &world, &batches, &mut ours);
+                let hits = ours.hit_count();
+                assert!(hits > 1000 && hits < 2600, "{hits} hits test little");
+                // Twice: rays are packed anew although the first pass used them up.
+                for _ in 0..2 {
+                    let mut theirs = Answers::new(query, &batches);
+                    workers.peer_pass(&*peer, &batches, &mut theirs);
+                    let agreement = compare(&ours, &theirs);
+                    assert_eq!((agreement.differences, agreement.ties), (0, 0), "{what} {query:?}: {agreement:?}");
+                    same_weights(&ours, &theirs, &what);
+                }
+            }
+            count += 1;
+        }
+    }
+    Ok(count)
+}
+
+/// u and v mean the same for both.
+fn same_weights(ours: &Answers<f32>, theirs: &Answers<f32>, what: &str) {
+    if let (Answers::Closest(a), Answers::Closest(b)) = (ours, theirs) {
+        for (a, b) in a.iter().zip(b) {
+            for i in (0..a.len()).filter(|&i| a.is_hit(i)) {
+                let apart = (a.u[i] - b.u[i]).abs().max((a.v[i] - b.v[i]).abs());
+                assert!(apart < 2e-3, "{what}: u v {} {} against {} {}", a.u[i], a.v[i], b.u[i], b.v[i]);
+            }
+        }
+    }
+}
+
+#[test]
+fn obvhs_finds_what_scalar_finds() {
+    let invitation = Invitation { names: vec!["obvhs".into()], embree: None };
+    for threads in [1, 3] {
+        assert_eq!(agree_on_the_soup(&invitation, threads), Ok(2));
+    }
+}
+
+#[test]
+fn every_mode_of_embree_finds_what_scalar_finds() {
+    let invitation = Invitation { names: vec!["embree".into(), "embree-robust".into()], embree: None };
+    for threads in [1, 2] {
+        match agree_on_the_soup(&invitation, threads) {
+            Ok(count) => assert_eq!(count, 16),
+            // A library that was named must work.
+            Err(why) if std::env::var_os(embree::VARIABLE).is_some() => panic!("{why}"),
+            Err(why) => println!("SKIPPED: {why}"),
+        }
+    }
+}
+
+/// Why the only guest of `names` has no mode.
+fn refusal<S: Real>(scene: &Description, names: &[&str], library: &str) -> String {
+    let invitation =
+        Invitation { names: names.iter().map(|name| name.to_string()).collect(), embree: Some(PathBuf::from(library)) };
+    let assembly = Assembly::new(scene).unwrap();
+    let guests = invitation.open::<S>(&assembly, &Workers::new(1).unwrap()).unwrap();
+    guests.into_iter().next().unwrap().modes.err().unwrap()
+}
+
+#[test]
+fn what_is_missing_is_said() {
+    let why = refusal::<f32>(&soup(), &["embree"], "/nowhere/libembree4.so");
+    assert!(why.contains("--embree") && why.contains("/nowhere/libembree4.so"), "{why}");
+    assert!(refusal::<f64>(&soup(), &["obvhs"], "").contains("f32 only"));
+    let empty = Description::new("empty");
+    assert!(refusal::<f32>(&empty, &["obvhs"], "").contains("no triangles"));
+}
+
+/// A library that loads but is something else is refused by the first name it lacks.
+#[cfg(target_os = "linux")]
+#[test]
+fn other_libraries_are_refused() {
+    let why = refusal::<f32>(&soup(), &["embree"], "libc.so.6");
+    assert!(why.contains("not an Embree 4 library") && why.contains("rtcNewDevice"), "{why}");
+}
+
+#[test]
+fn unknown_peers_are_refused_with_a_suggestion() {
+    let invitation = Invitation { names: vec!["embre".into()], embree: None };
+    let text = invitation.check().unwrap_err().to_string();
+    assert!(text.contains("did you mean `embree`") && text.contains("obvhs"), "{text}");
+}
+
+#[test]
+fn numbers_of_hits_are_renamed_and_misses_left() {
+    let mut hits = Hits::<f32>::new(3);
+    hits.prim[1] = 1;
+    rename(&[[7, 8], [5, 6]], &mut hits);
+    assert_eq!((hits.prim[1], hits.inst[1]), (5, 6));
+    assert!(!hits.is_hit(0) && !hits.is_hit(2));
+}
