@@ -32,7 +32,12 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     rays: Option<u64>,
     /// Ray classes
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "primary,shadow,ao,reflect,diffuse")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "primary,shadow,ao,reflect,diffuse,scatter"
+    )]
     kinds: Vec<RayKind>,
     /// Seed of the random directions
     #[arg(long, default_value_t = 1)]

@@ -75,10 +75,7 @@ pub fn scene<S: Engines>(
     };
     let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines };
     for &kind in &plan.kinds {
-        let rays = match kind {
-            RayKind::Primary => view.primary.clone(),
-            _ => workers.install(|| view.starts.rays(kind, &view.setting)),
-        };
+        let rays = workers.install(|| view.rays(&world, kind));
         subject.class(kind, &convert(&rays), plan.repeat, stop, report)?;
     }
     Ok(())
