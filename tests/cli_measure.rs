@@ -24,14 +24,14 @@ fn verify_covers_every_engine_query_class_and_precision() {
     let lines = report["lines"].as_array().expect("lines");
     let count = |key: &str, value: &str| lines.iter().filter(|line| line[key] == value).count();
     for precision in ["f32", "f64"] {
-        // Some engines exist in one precision only; each answers 5 classes x 2 queries.
-        assert!(count("precision", precision) >= 40 && count("precision", precision) % 10 == 0, "{precision}");
+        // Some engines exist in one precision only; each answers 6 classes x 2 queries.
+        assert!(count("precision", precision) >= 48 && count("precision", precision) % 12 == 0, "{precision}");
     }
-    for class in ["primary", "shadow", "ao", "reflect", "diffuse"] {
-        assert_eq!(count("class", class), lines.len() / 5, "{class}");
+    for class in ["primary", "shadow", "ao", "reflect", "diffuse", "scatter"] {
+        assert_eq!(count("class", class), lines.len() / 6, "{class}");
     }
     for engine in ["brute", "scalar", "packet4", "packet8"] {
-        assert_eq!(count("engine", engine), 20, "{engine}");
+        assert_eq!(count("engine", engine), 24, "{engine}");
     }
     for line in lines {
         let judged: u64 = ["agree", "unexplained"].iter().filter_map(|key| line["oracle"][key].as_u64()).sum();
@@ -39,7 +39,13 @@ fn verify_covers_every_engine_query_class_and_precision() {
             line["oracle"]["explained"].as_object().expect("reasons").values().filter_map(|n| n.as_u64()).sum();
         assert_eq!(line["rays"].as_u64(), Some(judged + explained), "every ray is judged: {line}");
     }
-    assert!(lines.iter().any(|l| l["class"] == "primary" && l["hits"].as_u64() > Some(0)));
+    for class in ["primary", "scatter"] {
+        assert!(lines.iter().any(|l| l["class"] == class && l["hits"].as_u64() > Some(0)), "{class}");
+    }
+    let brief = run(&dir, "verify square.ply --rays 300").out;
+    assert_eq!(brief.lines().count(), 1 + 2 * 6 * 2, "a line per precision, class and query: {brief}");
+    let full = run(&dir, "verify square.ply --rays 300 -v").out;
+    assert_eq!(full.lines().count(), brief.lines().count() + lines.len(), "and one per engine: {full}");
 }
 
 #[test]

@@ -24,7 +24,8 @@ Examples:
   lanecast rays model.ply --kind shadow --eye 0,1,5 --look-at 0,1,0 -o shadow.npy
 
 Kinds: primary; shadow (to the scene's first point light, or one just above the eye, which is t = 1);
-ao (one cosine-distributed ray per hit, 5 % of the scene's diagonal long); reflect (mirror); diffuse (cosine).
+ao (one cosine-distributed ray per hit, 5 % of the scene's diagonal long); reflect (mirror); diffuse (cosine);
+scatter (aimed at random primitives from all sides, as many as there are pixels, in no order).
 The order is that of 32x32 pixel tiles, Morton order inside. Where a primary ray misses, the others are dead
 (t_max < t_min).";
 
@@ -34,7 +35,7 @@ The order is that of 32x32 pixel tiles, Morton order inside. Where a primary ray
 pub struct RaysArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Ray class: primary, shadow, ao, reflect or diffuse
+    /// Ray class: primary, shadow, ao, reflect, diffuse or scatter
     #[arg(long)]
     kind: RayKind,
     #[command(flatten)]
@@ -98,8 +99,5 @@ fn rays<S: Engines>(args: &RaysArgs, description: &Description, size: (u32, u32)
     let world = World::<S>::compile(description, args.scene.options.preset())?;
     let camera = |bounds| args.camera.choose(description, bounds, size);
     let view = View::new(&world, description, &camera, size, args.seed)?;
-    Ok(match args.kind {
-        RayKind::Primary => view.primary,
-        kind => view.starts.rays(kind, &view.setting),
-    })
+    Ok(view.rays(&world, args.kind))
 }

@@ -1,6 +1,6 @@
 //! `lanecast verify`: do the fast kernels agree with the truth?
 
-use std::fmt::Write as _;
+mod table;
 
 use super::common::{CameraArgs, OutputArgs, PrecisionArg, SceneArgs, ThreadArgs};
 use super::interrupt::stopped;
@@ -19,8 +19,8 @@ Examples:
 
 Every engine answers closest-hit and any-hit queries for every ray class. Each answer is judged by an f64
 brute-force oracle (same, explained by a rounding margin, or unexplained) and compared bit for bit with the
-scalar engine and with itself when the rays come in another order. Exit code 1 if any answer is unexplained
-or any bit differs.";
+scalar engine and with itself when the rays come in another order. The table adds up the engines; -v shows
+each, and so does a failure. Exit code 1 if any answer is unexplained or any bit differs.";
 
 /// Arguments of `lanecast verify`.
 #[derive(Debug, clap::Args)]
@@ -32,7 +32,12 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     rays: Option<u64>,
     /// Ray classes
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "primary,shadow,ao,reflect,diffuse")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "primary,shadow,ao,reflect,diffuse,scatter"
+    )]
     kinds: Vec<RayKind>,
     /// Seed of the random directions
     #[arg(long, default_value_t = 1)]
@@ -73,7 +78,7 @@ pub fn run(args: &VerifyArgs) -> Result<()> {
     if args.output.json {
         json_to_stdout(&Report { scene: &args.scene.scene, pass: failed == 0 && finished.is_ok(), lines: &lines })?;
     } else {
-        to_stdout(&table(&lines))?;
+        to_stdout(&table::table(&lines, args.output.verbose > 0))?;
     }
     finished?;
     if failed > 0 {
@@ -100,46 +105,9 @@ fn one<S: Engines>(
     let bar = args.output.progress_bar((2 * args.kinds.len() * S::engines().len()) as u64, "verifying");
     let mut report = |line: Line| {
         bar.inc(1);
-        args.output.detail(&row(&line));
         lines.push(line);
     };
     let result = verify::<S>(workers, description, &camera, &options, &stopped, &mut report);
     bar.finish_and_clear();
     result
-}
-
-fn table(lines: &[Line]) -> String {
-    let mut text = format!(
-        "{:<4} {:<8} {:<8} {:<10} {:>9} {:>9} {:>9} {:>9} {:>11} {:>9} {:>9}\n",
-        "", "rays", "query", "engine", "rays", "hits", "agree", "explained", "unexplained", "bits", "order"
-    );
-    for line in lines {
-        text.push_str(&row(line));
-        text.push('\n');
-    }
-    text
-}
-
-fn row(line: &Line) -> String {
-    let mut text = format!("{:<4} {:<8} {:<8} {:<10}", line.precision, line.class, line.query, line.engine);
-    // Writing to a String cannot fail.
-    if let Some(why) = &line.skipped {
-        let _infallible = write!(text, " {:>9} skipped: {why}", line.rays);
-        return text;
-    }
-    let oracle = &line.oracle;
-    let (explained, bits, order) = (oracle.explained_total(), line.bit_differences, line.order_differences);
-    let _infallible = write!(
-        text,
-        " {:>9} {:>9} {:>9} {explained:>9} {:>11} {bits:>9} {order:>9}",
-        line.rays, line.hits, oracle.agree, oracle.unexplained
-    );
-    let reasons: Vec<String> = oracle.explained.iter().map(|(why, n)| format!("{why} {n}")).collect();
-    if !reasons.is_empty() {
-        let _infallible = write!(text, "  ({})", reasons.join(", "));
-    }
-    for wrong in oracle.samples.iter().take(1).chain(&line.first_difference) {
-        let _infallible = write!(text, "\n     WRONG {wrong}");
-    }
-    text
 }

@@ -80,10 +80,7 @@ pub fn scene<S: Engines>(
     let guests = plan.peers.open::<S>(&world.assembly, workers)?;
     let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests };
     for &kind in &plan.kinds {
-        let rays = match kind {
-            RayKind::Primary => view.primary.clone(),
-            _ => workers.install(|| view.starts.rays(kind, &view.setting)),
-        };
+        let rays = workers.install(|| view.rays(&world, kind));
         subject.class(kind, &convert(&rays), plan.repeat, stop, report)?;
     }
     Ok(())

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::camera::{Camera, FILE_TILE, PixelRect, SubPixel, Tiling, fill_tile};
 use crate::error::Result;
 use crate::lanes::Real;
-use crate::measure::raysets::{Setting, Starts, light_for};
+use crate::measure::raysets::{RayKind, Setting, Starts, light_for, scatter};
 use crate::ray::{Hits, Rays};
 use crate::scene::description::{CameraDescription, Description};
 use crate::scene::world::World;
@@ -23,6 +23,8 @@ pub struct View {
     pub starts: Starts,
     /// Light, diagonal and seed.
     pub setting: Setting,
+    /// Pixels of the picture.
+    pub pixels: u64,
 }
 
 impl View {
@@ -48,7 +50,20 @@ impl View {
         let up = camera.up.normalize_or_zero();
         let clearance = clearance(world, scalar, camera.eye, up);
         let light = light_for(&description.lights, camera.eye, up, diagonal, clearance);
-        Ok(Self { primary, starts, setting: Setting { light, diagonal, seed } })
+        let pixels = u64::from(size.0) * u64::from(size.1);
+        Ok(Self { primary, starts, setting: Setting { light, diagonal, seed }, pixels })
+    }
+
+    /// The rays of class `kind` in `world`, on the current rayon pool: a tile per batch, or as many scattered rays
+    /// as the picture has pixels.
+    pub fn rays<S: Real>(&self, world: &World<S>, kind: RayKind) -> Vec<Rays<f32>> {
+        match kind {
+            RayKind::Primary => self.primary.clone(),
+            RayKind::Scatter => scatter(&world.assembly, self.pixels, self.setting.seed),
+            RayKind::Shadow | RayKind::Ao | RayKind::Reflect | RayKind::Diffuse => {
+                self.starts.rays(kind, &self.setting)
+            }
+        }
     }
 }
 

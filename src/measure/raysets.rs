@@ -3,7 +3,9 @@
 //! Every set keeps the order of the ray file (see `camera`): 32x32 pixel tiles row by row, Morton order inside, one
 //! batch of [`BATCH`] rays per tile. Rays are made in f32 whatever the engines compute in, so that f32 and f64
 //! engines (and other programs, through a ray file) see the same numbers. Where a primary ray misses, the secondary
-//! ray is dead.
+//! ray is dead. One class needs no camera: [`scatter`] aims at the scene's own primitives.
+
+mod scatter;
 
 use std::sync::Mutex;
 
@@ -17,6 +19,8 @@ use crate::ray::{Hits, Rays};
 use crate::scene::description::Light;
 use crate::scene::world::{Surface, World};
 use crate::trace::{Engine, Scratch};
+
+pub use scatter::scatter;
 
 /// Rays per batch: one tile of 32x32 pixels.
 pub const BATCH: usize = 1024;
@@ -73,11 +77,13 @@ pub enum RayKind {
     Reflect,
     /// One ray per hit, cosine distributed, without end: what a path tracer's second bounce looks like.
     Diffuse,
+    /// Aimed at random primitives from all sides and distances, whatever their scale (see [`scatter`]).
+    Scatter,
 }
 
 impl RayKind {
     /// All classes, in the order of tables.
-    pub const ALL: [Self; 5] = [Self::Primary, Self::Shadow, Self::Ao, Self::Reflect, Self::Diffuse];
+    pub const ALL: [Self; 6] = [Self::Primary, Self::Shadow, Self::Ao, Self::Reflect, Self::Diffuse, Self::Scatter];
 
     /// Name on the command line and in tables.
     pub fn name(self) -> &'static str {
@@ -87,13 +93,14 @@ impl RayKind {
             Self::Ao => "ao",
             Self::Reflect => "reflect",
             Self::Diffuse => "diffuse",
+            Self::Scatter => "scatter",
         }
     }
 
     /// What a renderer asks of these rays, so what a bench times.
     pub fn query(self) -> Query {
         match self {
-            Self::Primary | Self::Reflect | Self::Diffuse => Query::Closest,
+            Self::Primary | Self::Reflect | Self::Diffuse | Self::Scatter => Query::Closest,
             Self::Shadow | Self::Ao => Query::Any,
         }
     }
@@ -170,8 +177,8 @@ impl Starts {
         self.batches.iter().flatten().flatten().count()
     }
 
-    /// The secondary rays of `kind`; primary rays cannot be made from their own hits, so for
-    /// [`RayKind::Primary`] all rays are dead.
+    /// The secondary rays of `kind`; [`RayKind::Primary`] and [`RayKind::Scatter`] are not made from hits: for
+    /// them all rays are dead.
     pub fn rays(&self, kind: RayKind, setting: &Setting) -> Vec<Rays<f32>> {
         let batch_rays = |(b, starts): (usize, &Vec<Option<Start>>)| {
             let mut rays = Rays::new(starts.len());
@@ -231,7 +238,7 @@ fn secondary(kind: RayKind, at: &Start, setting: &Setting, random: [f64; 2]) -> 
     }
     let cosine = || cosine_hemisphere(at.normal, random);
     let (dir, t_max) = match kind {
-        RayKind::Primary => return None,
+        RayKind::Primary | RayKind::Scatter => return None,
         RayKind::Shadow => {
             // A surface that faces away from the light is left on its far side, as a shader would leave it.
             let normal = if (setting.light - at.position).dot(at.normal) < 0.0 { -at.normal } else { at.normal };

@@ -4,7 +4,9 @@ use std::sync::Mutex;
 
 use crate::lanes::Real;
 use crate::ray::{Counters, Hits, Rays};
-use crate::scene::description::Description;
+use crate::scene::assembly::Assembly;
+use crate::scene::description::{Description, Item, ItemKind};
+use crate::scene::mesh::Mesh;
 use crate::scene::world::{Preset, World};
 use crate::trace::{Engine, Scratch};
 
@@ -100,4 +102,12 @@ pub fn falling_rays<S: Real>(sizes: &[usize]) -> Vec<Rays<S>> {
         rays
     };
     sizes.iter().map(&mut batch).collect()
+}
+
+/// A scene of one item under the identity; `mesh` is mesh 0.
+pub fn scene_of(kind: ItemKind, mesh: Option<Mesh>) -> Assembly {
+    let mut scene = Description::new("one item");
+    scene.meshes = mesh.into_iter().map(Into::into).collect();
+    scene.groups[0].items.push(Item { transform: glam::DAffine3::IDENTITY, material: None, kind });
+    Assembly::new(&scene).unwrap()
 }

@@ -96,10 +96,7 @@ pub fn verify<S: Engines>(
     let oracle = Oracle::new(&world.assembly);
     let bench = Bench { workers, world: &world, oracle: &oracle };
     for &kind in &options.kinds {
-        let rays = match kind {
-            RayKind::Primary => view.primary.clone(),
-            _ => workers.install(|| view.starts.rays(kind, &view.setting)),
-        };
+        let rays = workers.install(|| view.rays(&world, kind));
         let batches = convert::<S>(&rays);
         for query in [Query::Closest, Query::Any] {
             bench.query(kind, query, &batches, stop, report)?;

@@ -1,6 +1,6 @@
 //! Judges an engine's answer for one ray: the two rules of the module's head.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 
 use glam::DVec3;
@@ -114,6 +114,17 @@ struct Case<'a> {
 
 type Finding<T> = Result<T, String>;
 
+/// Sheets that a displaced ray was seen to miss, with the margin that allowed it. The same ray serves all their
+/// members with that margin or a wider one: what else their sheets hold is farther away than it was displaced.
+#[derive(Default)]
+struct Missed(Vec<(f64, HashSet<Id>)>);
+
+impl Missed {
+    fn holds(&self, id: Id, delta: f64) -> bool {
+        self.0.iter().any(|(margin, sheet)| *margin <= delta && sheet.contains(&id))
+    }
+}
+
 impl<'a> Case<'a> {
     fn delta(&self, located: &Located, t: f64) -> f64 {
         let at = if t.is_finite() { self.ray.at(t) } else { self.ray.org };
@@ -192,6 +203,7 @@ impl<'a> Case<'a> {
         let mut reason = None;
         let reported = answer.map(|a| Id { inst: a.inst, prim: a.prim });
         let until = answer.map_or(f64::INFINITY, |a| a.t);
+        let mut missed = Missed::default();
         for located in self.oracle.near(self.ray, &self.margin, 0.0) {
             for (order, crossing) in located.crossings(self.ray).into_iter().enumerate() {
                 let Some(crossing) = crossing.filter(|c| self.in_segment(c.t)) else { continue };
@@ -204,7 +216,7 @@ impl<'a> Case<'a> {
                     continue;
                 } else if self.at_an_end(&located, order, delta) {
                     reason = reason.or(Some(Why::SegmentEnd));
-                } else if self.missable(&located, delta, until) {
+                } else if self.missable(&located, delta, until, &mut missed) {
                     let edge_on = located.steepness(self.ray, crossing) < GRAZING;
                     let grazing = edge_on && located.triangle().is_some();
                     reason = Some(if grazing { Why::Grazing } else { border(&located) });
@@ -227,8 +239,15 @@ impl<'a> Case<'a> {
     }
 
     /// Whether some ray displaced by at most `delta` meets nothing of the sheet around `hit` before `until`.
-    fn missable(&self, hit: &Located, delta: f64, until: f64) -> bool {
+    fn missable(&self, hit: &Located, delta: f64, until: f64, missed: &mut Missed) -> bool {
+        if missed.holds(hit.id, delta) {
+            return true;
+        }
+        // The oracle's own rounding hides the rims of what it crosses: a ray has to be displaced by that much more.
         let near = self.oracle.near(self.ray, &self.margin, delta);
+        let blur = sheet(hit, &near).iter().map(|q| q.blur(self.ray)).fold(0.0, f64::max);
+        let reach = delta + blur;
+        let near = self.oracle.near(self.ray, &self.margin, reach);
         let sheet = sheet(hit, &near);
         // A crossing that the answer's own t or a segment end covers does not stand in the way.
         let excused = |q: &Located, order: usize| {
@@ -236,13 +255,17 @@ impl<'a> Case<'a> {
             q.passes(self.ray, until, Some(order), delta) || self.at_an_end(q, order, delta)
         };
         let excused: Vec<_> = sheet.iter().map(|q| [excused(q, 0), excused(q, 1)]).collect();
-        hit.displaced(self.ray, delta).any(|ray| {
+        let misses = hit.displaced(self.ray, reach).any(|ray| {
             sheet.iter().zip(&excused).all(|(q, excused)| {
                 let crossings = q.crossings(&ray).into_iter().zip(excused);
                 let mut blocking = crossings.filter(|(_, excused)| !**excused).filter_map(|(c, _)| c);
                 !blocking.any(|c| self.in_segment(c.t) && c.t <= until)
             })
-        })
+        });
+        if misses {
+            missed.0.push((delta, sheet.iter().map(|q| q.id).collect()));
+        }
+        misses
     }
 
     /// Any-hit said occluded where the oracle finds nothing: something must be within the margin.

@@ -40,7 +40,7 @@ impl Margin {
 }
 
 /// Placement and primitive number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Id {
     pub inst: u32,
     pub prim: u32,
@@ -98,6 +98,18 @@ impl Located<'_> {
                 shapes::crossings(solid.shape, local.org, local.dir)
             }
         }
+    }
+
+    /// How far the oracle itself may be off beside an edge: what it sees is that much larger than the triangle. Next
+    /// to nothing for an f32 engine; an f64 engine's own rounding is of this size. 0 if the line does not cross.
+    pub fn blur(&self, ray: &OracleRay) -> f64 {
+        let crossed = self.triangle().filter(|_| self.crossings(ray)[0].is_some());
+        crossed.map_or(0.0, |[p0, p1, p2]| {
+            let (e1, e2) = (p1 - p0, p2 - p0);
+            // Beyond the third edge both weights' errors add up, and one unit of u + v is |ng| / |third edge| long.
+            let third = (e1.length() + e2.length()) / (p2 - p1).length();
+            2.0 * shapes::fatness(p0, shapes::cross(e1, e2), ray.org, ray.dir) * third
+        })
     }
 
     /// Sine of the angle between the ray and the surface at a crossing.

@@ -69,11 +69,16 @@ pub(super) fn triangle_plane([p0, p1, p2]: [DVec3; 3], org: DVec3, dir: DVec3) -
     (det.abs() > PARALLEL * dir.length() * ng.length()).then_some(hit)
 }
 
+/// How far a triangle reaches beyond its edges, in its plane, for a line that crosses it.
+pub(super) fn fatness(p0: DVec3, ng: DVec3, org: DVec3, dir: DVec3) -> f64 {
+    FAT * (org - p0).length() * (dir.length() * ng.length()) / dir.dot(ng).abs()
+}
+
 /// The line's crossing with a triangle, both sides, edges included.
 pub(super) fn triangle(corners: [DVec3; 3], org: DVec3, dir: DVec3) -> Option<TriangleCrossing> {
     let hit = triangle_plane(corners, org, dir)?;
     let [p0, p1, p2] = corners;
-    let fat = FAT * dir.length() * (org - p0).length() / dir.dot(hit.ng).abs();
+    let fat = fatness(p0, hit.ng, org, dir) / hit.ng.length();
     let (fat_u, fat_v) = (fat * (p2 - p0).length(), fat * (p1 - p0).length());
     (hit.u >= -fat_u && hit.v >= -fat_v && hit.u + hit.v <= 1.0 + fat_u + fat_v).then_some(hit)
 }

@@ -83,11 +83,18 @@ impl<V: Lanes> Span<V> {
 
 /// The line's origin moved to its point nearest to the local origin, and the parameter of that point. Quadratics
 /// solved from there lose no digits to the distance of the eye (Haines, Günther, Akenine-Möller, "Precision
-/// Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019).
+/// Improvements for Ray/Sphere Intersection", Ray Tracing Gems, 2019). The first step is off by an ulp of its length,
+/// which is the size of the shape where a flat one is seen from 10^6 local units away; the second makes up for it.
 #[inline(always)]
 pub fn nearest_to_origin<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>) -> (Lanes3<V>, V) {
-    let shift = -(crate::lanes::dot(o, d) / crate::lanes::dot(d, d));
-    ([0, 1, 2].map(|a| d[a].mul_add(shift, o[a])), shift)
+    let square = crate::lanes::dot(d, d);
+    let step = |o: Lanes3<V>| {
+        let shift = -(crate::lanes::dot(o, d) / square);
+        ([0, 1, 2].map(|a| d[a].mul_add(shift, o[a])), shift)
+    };
+    let (rough, first) = step(o);
+    let (near, second) = step(rough);
+    (near, first + second)
 }
 
 /// Positive infinity in every lane.

@@ -150,11 +150,21 @@ impl Triangle {
         }
         let own = Self::bounds(n);
         let interval = Interval::of(packet, own.lo, own.hi);
-        found.t = packet.t_floor.fast_max(interval.clamp(found.t));
+        let end = V::select(interval.far.cmp_eq(V::constant(0.0)) & Self::along_a_face(packet), found.t, interval.far);
+        found.t = packet.t_floor.fast_max(interval.near.fast_max(found.t.fast_min(end)));
         // A parameter that overflowed is no hit: it would tie with the end of an infinite segment.
         let finite = found.t.abs().cmp_le(V::splat(V::Scalar::MAX));
-        found.hit = found.hit & interval.near.cmp_le(interval.far) & packet.t_min.cmp_le(found.t) & finite;
+        let meets = interval.near.cmp_le(interval.far) & packet.t_min.cmp_le(interval.far);
+        found.hit = found.hit & meets & packet.t_min.cmp_le(found.t) & finite;
         found
+    }
+
+    /// Lanes with a direction component of zero. A line in the upper face of a box has its interval end at 0 there
+    /// (`0 * rcp`), which says nothing about where the triangle is.
+    #[inline(always)]
+    fn along_a_face<V: Lanes>(packet: &Packet<V>) -> V::Mask {
+        let [x, y, z] = packet.dir.map(|d| d.abs().cmp_lt(V::splat(V::Scalar::MIN_POSITIVE)));
+        x | y | z
     }
 
     /// Determinants below this may have lost bits to underflow.

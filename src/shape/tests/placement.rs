@@ -194,3 +194,31 @@ proptest! {
         parity::<f64, Cone>(&map, top, &rays, double);
     }
 }
+
+/// Plates 10^-5 as thick as wide, seen from 100 widths: 10^7 local units, where an ulp is the shape's own size. The
+/// rays go through (x, y, 0) in the middle of the plate; its top is at most 10^-5 away from there.
+#[test]
+fn flat_shapes_are_met_from_far_away() {
+    fn met<S: Widths, K: Solid>(param: f64, tol: f64) {
+        let map = exact_map(&DAffine3::from_scale(DVec3::new(1.0, 1.0, 1e-5)));
+        let mut r = Random(11);
+        let mut ray = || {
+            let (target, lean) = (r.cube() * 0.3, r.cube() * 0.3);
+            let (x, y) = (target.x as f32, target.y as f32);
+            let to = DVec3::new(f64::from(x), f64::from(y), 0.0);
+            let org = (to + DVec3::new(lean.x, lean.y, 1.0) * 100.0).as_vec3().as_dvec3();
+            (org, (to - org).as_vec3().as_dvec3())
+        };
+        let rays: Vec<Ray> = (0..1000).map(|_| ray()).collect();
+        for (i, piece) in traced::<S, K>(&map, param, &rays).iter().enumerate() {
+            let (t, _) = piece.nearest.unwrap_or_else(|| panic!("ray {i} of {:?}: {piece:?}", rays[i]));
+            assert!((t - 1.0).abs() < tol, "ray {i}: {t}");
+        }
+    }
+    met::<f32, Sphere>(0.0, 1e-6);
+    met::<f32, Cylinder>(0.0, 1e-6);
+    met::<f32, Cone>(0.4, 1e-6);
+    met::<f64, Sphere>(0.0, 2e-7);
+    met::<f64, Cylinder>(0.0, 2e-7);
+    met::<f64, Cone>(0.4, 2e-7);
+}

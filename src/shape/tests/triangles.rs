@@ -273,3 +273,20 @@ fn blocks_give_back_what_was_put_in() {
     }
     assert_eq!(block.fields[4][6], 64.0);
 }
+
+/// A ray from inside the triangle's box, in its upper face x = 1, to the edge from (1, 2, 2) to (1, -2, -1) at
+/// (1, -1, -0.25): 3 units of t away, not 0, where `0 * rcp` lets the box end.
+#[test]
+fn a_ray_in_a_face_of_the_box_gets_its_own_t() {
+    fn check<S: Real>() {
+        let corners = [DVec3::new(1.0, 2.0, 2.0), DVec3::new(0.25, -1.5, 0.5), DVec3::new(1.0, -2.0, -1.0)];
+        for x in [0.0, -0.0] {
+            let ray = (DVec3::new(1.0, -0.25, -1.0), DVec3::new(x, -0.25, 0.25));
+            near(hit::<S>(ray, &record(corners)), [3.0, 0.0, 0.75], 1e-6);
+            let mirrored = |p: DVec3| DVec3::new(-p.x, p.y, p.z);
+            near(hit::<S>((mirrored(ray.0), ray.1), &record(corners.map(mirrored))), [3.0, 0.0, 0.75], 1e-6);
+        }
+    }
+    check::<f32>();
+    check::<f64>();
+}
