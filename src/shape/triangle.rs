@@ -220,8 +220,8 @@ fn unit_normal<S: Real>(n: &[S; 9]) -> [f64; 3] {
         }
     };
     let normal = [minor(1, 2), minor(2, 0), minor(0, 1)];
-    let largest = normal[0].abs().max(normal[1].abs()).max(normal[2].abs());
-    normal.map(|x| x / largest)
+    let scale = 1.0 / normal[0].abs().max(normal[1].abs()).max(normal[2].abs());
+    normal.map(|x| x * scale)
 }
 
 /// Edge functions of `N` ray-triangle pairs in the rays' sheared frames.

@@ -35,6 +35,12 @@ impl<S: Real> Stack<S> {
         self.entries.len()
     }
 
+    /// Drops everything above `base`.
+    #[inline(always)]
+    pub fn truncate(&mut self, base: usize) {
+        self.entries.truncate(base);
+    }
+
     /// Puts a box on the stack: its `lanes` enter at `near`.
     #[inline(always)]
     pub fn push<V: Lanes<Scalar = S>>(&mut self, child: Child, lanes: u32, near: V) {

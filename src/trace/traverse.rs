@@ -104,6 +104,7 @@ fn tree<V, L, const ANY: bool, const COUNT: bool>(
         return;
     }
     let mut bundle = Bundle::of(packet, lanes, query.hit.t);
+    let all = lanes;
     let base = query.stack.len();
     query.stack.push(root, lanes, V::splat(V::Scalar::LOWEST));
     while let Some((mut child, waiting, near)) = query.stack.pop::<V>(base) {
@@ -118,6 +119,10 @@ fn tree<V, L, const ANY: bool, const COUNT: bool>(
             }
             if child.is_leaf() {
                 leaves.visit(packet, query, child, lanes);
+                if ANY && query.done & all == all {
+                    query.stack.truncate(base);
+                    return;
+                }
                 bundle.shorten(query.hit.t);
                 break;
             }
