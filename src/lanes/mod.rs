@@ -16,6 +16,7 @@ mod isa;
 mod pair;
 mod scalar;
 mod vector;
+pub mod words;
 
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
