@@ -1,0 +1,116 @@
+//! Where the common formula has the word: doubtful pairs while a tile is traced, and the numbers of its final hits.
+
+use super::bundle::Bundle;
+use super::groups::{Groups, NO_SLOT, bounded};
+use super::{Mask, V, select};
+use crate::lanes::{LaneMask, Lanes};
+use crate::ray::{Candidate, HitPacket, Packet};
+use crate::scene::world::Object;
+use crate::shape::Triangle;
+
+/// What the common formula needs: the rays as they came and the triangles as they are stored.
+#[derive(Debug)]
+pub struct Exact<'a> {
+    /// The rays.
+    pub bundle: &'a Bundle<'a>,
+    /// The triangles.
+    pub object: &'a Object<f32>,
+}
+
+impl Exact<'_> {
+    fn triangle(&self, slot: u32) -> ([f32; 9], u32) {
+        let block = &self.object.triangles[(slot >> 3) as usize];
+        (block.get((slot & 7) as usize), block.prim[(slot & 7) as usize])
+    }
+
+    /// The lanes of `lanes` that hit a triangle at all, and where.
+    #[inline(always)]
+    fn meet(&self, packet: &Packet<V>, slot: u32, lanes: u32, mut found: impl FnMut(&Candidate<V>, u32, u32)) {
+        let (numbers, prim) = self.triangle(slot);
+        Triangle::intersect(packet, &numbers, lanes, |candidate, lanes| found(candidate, lanes, prim));
+    }
+
+    /// Writes what the common formula says of a group's winners into `hit`. Returns lanes where it denies the hit:
+    /// none, if the error bounds of the tile's arithmetic hold.
+    #[inline(always)]
+    pub fn commit(&self, groups: &Groups, g: usize, packet: &Packet<V>, hit: &mut HitPacket<V>) -> u32 {
+        let slots = &groups.slot[g];
+        let mut rest = 0;
+        for lane in 0..V::N {
+            rest |= u32::from(slots[lane] != NO_SLOT) << lane;
+        }
+        let mut denied = rest;
+        while rest != 0 {
+            let slot = slots[rest.trailing_zeros() as usize & 15];
+            let same = lanes_with(slots, slot);
+            rest &= !same;
+            self.meet(packet, slot, same, |found, lanes, prim| {
+                hit.commit(lanes, found, prim, 0);
+                denied &= !(found.hit & found.t.cmp_le(hit.t)).bits() | !lanes;
+            });
+        }
+        denied
+    }
+}
+
+#[inline(always)]
+fn lanes_with(slots: &[u32; 16], slot: u32) -> u32 {
+    let mut lanes = 0;
+    for lane in 0..V::N {
+        lanes |= u32::from(slots[lane] == slot) << lane;
+    }
+    lanes
+}
+
+/// Decides by the common formula whether a triangle is hit by `lanes` of a group, and whether it is nearer than what
+/// they hit so far, by the tie rule if need be.
+#[cold]
+#[inline(never)]
+pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slot: u32, lanes: u32) {
+    let (packet, t_max, _) = Packet::<V>::load(exact.bundle.rays, exact.bundle.first + g * V::N);
+    let mut hits = 0;
+    let mut t = t_max;
+    exact.meet(&packet, slot, lanes, |found, lanes, _| {
+        let hit = (found.hit & found.t.cmp_le(t_max)).bits() & lanes;
+        t = select(Mask::from_bits(hit), found.t, t);
+        hits |= hit;
+    });
+    if ANY {
+        groups.done[g] |= hits;
+        let done = Mask::from_bits(hits);
+        groups.inv_lo[g] = select(done, V::splat(f32::INFINITY), groups.inv_lo[g]);
+        return;
+    }
+    if hits == 0 {
+        return;
+    }
+    let (_, prim) = exact.triangle(slot);
+    let mut wins = hits;
+    let mut rest = hits;
+    for lane in 0..V::N {
+        if groups.slot[g][lane] == NO_SLOT {
+            rest &= !(1 << lane);
+        }
+    }
+    while rest != 0 {
+        let old = groups.slot[g][rest.trailing_zeros() as usize & 15];
+        let same = rest & lanes_with(&groups.slot[g], old);
+        rest &= !same;
+        exact.meet(&packet, old, same, |found, lanes, old_prim| {
+            let nearer = t.cmp_lt(found.t).bits();
+            let tie = if prim < old_prim { t.cmp_eq(found.t).bits() } else { 0 };
+            wins &= nearer | tie | !(lanes & found.hit.bits());
+        });
+    }
+    // From here on the depth is known as well as the common formula knows it.
+    let inverse = V::constant(1.0) / (t * groups.speed[g]);
+    let loose = groups.loose();
+    let mask = Mask::from_bits(wins);
+    groups.inv_lo[g] = select(mask, bounded(inverse) * V::splat(1.0 - loose), groups.inv_lo[g]);
+    groups.inv_hi[g] = select(mask, inverse * V::splat(1.0 + loose), groups.inv_hi[g]);
+    for lane in 0..V::N {
+        if wins >> lane & 1 != 0 {
+            groups.slot[g][lane] = slot;
+        }
+    }
+}
