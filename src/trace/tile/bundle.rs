@@ -80,7 +80,7 @@ impl<'a> Bundle<'a> {
             return None;
         }
         for at in [At::One, At::Limit] {
-            if let Some((apex, slack)) = bundle.common_end(at) {
+            if let Some((apex, slack)) = bundle.common_end(at, leader) {
                 (bundle.apex, bundle.slack, bundle.shared) = (apex, slack, Shared::End(at));
                 return Some(bundle);
             }
@@ -124,11 +124,16 @@ impl<'a> Bundle<'a> {
         })
     }
 
-    /// The middle of where the rays end and how far they are from it, if that can be rounding: at most 64 half ulps
-    /// of the largest coordinate.
-    fn common_end(&self, at: At) -> Option<([f32; 3], f32)> {
-        let (most, none) = (V::splat(f32::INFINITY), V::splat(f32::LOWEST));
-        let (mut lo, mut hi, mut size, mut fits) = ([most; 3], [none; 3], V::constant(0.0), true);
+    /// Where ray `leader` ends, and how far the others pass it, if that can be rounding: at most 64 half ulps of the
+    /// largest coordinate.
+    fn common_end(&self, at: At, leader: usize) -> Option<([f32; 3], f32)> {
+        let parameter = match at {
+            At::One => 1.0,
+            At::Limit => self.rays.t_max[leader],
+        };
+        let (org, dir) = (self.rays.org(leader), self.rays.dir(leader));
+        let apex = [0, 1, 2].map(|a| dir[a] * parameter + org[a]);
+        let (mut apart, mut size, mut fits) = (V::constant(0.0), V::constant(0.0), true);
         for g in 0..groups(self.rays, self.first) {
             let first = self.first + g * V::N;
             let (org, dir) = (load3(&self.rays.org, first), load3(&self.rays.dir, first));
@@ -139,19 +144,14 @@ impl<'a> Bundle<'a> {
             };
             fits &= self.tame[g] & !usable.bits() == 0;
             let lanes = Mask::from_bits(self.tame[g]);
-            for axis in 0..3 {
-                let end = dir[axis].mul_add(t, org[axis]);
-                lo[axis] = select(lanes, end, most).fast_min(lo[axis]);
-                hi[axis] = select(lanes, end, none).fast_max(hi[axis]);
-                let largest = end.abs().fast_max(org[axis].abs());
-                size = select(lanes, largest, size).fast_max(size);
-            }
+            // Differences first: the sum would hide what it rounds away.
+            let miss = [0, 1, 2].map(|a| dir[a].mul_add(t, org[a] - V::splat(apex[a])).abs());
+            let largest = org[0].abs().fast_max(org[1].abs()).fast_max(org[2].abs());
+            apart = select(lanes, miss[0] + miss[1] + miss[2], apart).fast_max(apart);
+            size = select(lanes, largest, size).fast_max(size);
         }
-        let least = |v: V| v.to_array().into_iter().fold(f32::INFINITY, f32::min);
-        let largest = |v: V| v.to_array().into_iter().fold(f32::LOWEST, f32::max);
-        let (lo, hi) = (lo.map(least), hi.map(largest));
-        let apex = [0, 1, 2].map(|a| lo[a] + (hi[a] - lo[a]) * 0.5);
-        let slack: f32 = (0..3).map(|a| hi[a] - lo[a]).sum();
-        (fits && slack <= 64.0 * HALF_ULP * largest(size)).then_some((apex, slack))
+        let largest = |v: V| v.to_array().into_iter().fold(0.0, f32::max);
+        let size = apex.iter().fold(largest(size), |m, x| x.abs().max(m));
+        (fits && largest(apart) <= 64.0 * HALF_ULP * size).then_some((apex, largest(apart)))
     }
 }
