@@ -111,8 +111,12 @@ impl Batch {
         let eps = moved * length * V::splat(2.0 * slant * slant)
             + spread * spread * V::splat(8.0 * HALF_ULP)
             + V::splat(f32::MIN_POSITIVE);
-        let rho = (moved * length * length * rcp.abs())
-            .mul_add(V::splat(4.0 * slant), V::splat(MOVED * HALF_ULP));
+        // Corners that move by `moved` move the plane no farther; 8 half ulps for the products of either formula,
+        // which are as large as the sides, and for the dot products.
+        let products = V::splat(8.0 * HALF_ULP);
+        let area = sum(normal);
+        let shift = area * products.mul_add(distance, moved) + products * length * length * length;
+        let rho = (shift * rcp.abs()).mul_add(V::splat(slant), V::splat(MOVED * HALF_ULP));
 
         // Triangles seen (nearly) edge-on have no side and no depth: met everywhere, certain nowhere.
         let tame = rho.cmp_lt(V::splat(WILD));
