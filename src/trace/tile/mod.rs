@@ -17,6 +17,7 @@ mod frame;
 mod groups;
 mod node;
 mod pairs;
+mod slab;
 mod walk;
 
 use super::query::{Query, Stack};
@@ -55,6 +56,7 @@ pub struct Memory {
     batch: batch::Batch,
     planes: batch::Planes,
     pairs: pairs::Pairs,
+    slabs: slab::Slabs,
     levels: Vec<node::Level>,
 }
 

@@ -18,7 +18,7 @@ type Half = f32x8;
 
 /// Rounding errors of a box test, in half ulps of the scene's size times the plane's size; and how far a hit that
 /// the triangle test may accept can lie outside.
-const MARGIN: f32 = 48.0;
+pub const MARGIN: f32 = 48.0;
 
 /// What node tests need of a tile.
 #[derive(Clone, Copy, Debug)]

@@ -24,12 +24,14 @@ impl Default for Pairs {
 /// Sets up the waiting triangles and takes their hits.
 #[inline(never)]
 pub fn flush<const ANY: bool, const COUNT: bool>(memory: &mut Memory, exact: &Exact, counters: &mut Counters) {
-    let Memory { groups, batch, planes, pairs, .. } = memory;
+    let Memory { groups, batch, planes, pairs, slabs, .. } = memory;
     let seen = batch.set_up(groups, planes);
     let count = list(seen, &batch.groups, groups, planes, pairs);
+    let mut found = 0;
     for k in 0..count {
         let (g, i) = (usize::from(pairs.group[k]) & 15, usize::from(pairs.triangle[k]) & 15);
-        let doubtful = pair::<ANY>(groups, planes, g, i, batch.slot[i]);
+        let (certain, doubtful) = pair::<ANY>(groups, planes, g, i, batch.slot[i]);
+        found += usize::from(certain | doubtful != 0);
         if doubtful != 0 {
             decide::<ANY>(groups, exact, g, batch.slot[i], doubtful);
         }
@@ -41,6 +43,7 @@ pub fn flush<const ANY: bool, const COUNT: bool>(memory: &mut Memory, exact: &Ex
         }
     }
     batch.clear();
+    slabs.learn(count, found);
     if count != 0 {
         groups.refresh();
     }
@@ -73,10 +76,10 @@ fn list(seen: u32, wanted: &[u32], groups: &Groups, planes: &Planes, pairs: &mut
     count
 }
 
-/// One triangle against the rays of one group: takes certain hits, returns the lanes where only the common formula
-/// can tell.
+/// One triangle against the rays of one group: takes certain hits. Returns their lanes, and the lanes where only the
+/// common formula can tell.
 #[inline(always)]
-fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usize, slot: u32) -> u32 {
+fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usize, slot: u32) -> (u32, u32) {
     let (s, t) = (groups.s[g], groups.t[g]);
     let (inv_lo, inv_hi) = (groups.inv_lo[g], groups.inv_hi[g]);
     let value = |k: usize| {
@@ -101,5 +104,5 @@ fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usiz
         let old = V::new(bytemuck::cast(groups.slot[g]));
         groups.slot[g] = bytemuck::cast(select(certain, V::splat(f32::from_bits(slot)), old).to_array());
     }
-    possible.bits() & !certain.bits()
+    (certain.bits(), possible.bits() & !certain.bits())
 }

@@ -23,6 +23,7 @@ pub fn walk<const ANY: bool, const COUNT: bool>(
     let tree = &exact.object.tree;
     let Some(root) = tree.nodes.first() else { return };
     memory.batch.clear();
+    memory.slabs.start();
     let planes = Planes::of(&memory.groups);
     let mut limit = limit(memory);
     let mut depth = 0;
@@ -40,11 +41,15 @@ pub fn walk<const ANY: bool, const COUNT: bool>(
             continue;
         }
         level.remove(slot);
-        let met = level.groups_at(slot, &memory.groups);
+        let mut met = level.groups_at(slot, &memory.groups);
+        let node = &tree.nodes[level.node as usize];
+        if met != 0 && memory.slabs.wanted::<ANY>(met) {
+            met = memory.slabs.test(&memory.groups, exact.bundle, &node.child_bounds(slot), met);
+        }
         if met == 0 {
             continue;
         }
-        let child = tree.nodes[level.node as usize].child(slot);
+        let child = node.child(slot);
         if child.is_leaf() {
             leaf::<ANY, COUNT>(memory, exact, child, met, counters);
             limit = self::limit(memory);
