@@ -3,7 +3,7 @@
 //! portable form bit by bit.
 #![allow(unsafe_code, reason = "instructions no crate offers as safe functions")]
 
-use wide::{f32x8, f32x16};
+use wide::{f32x8, f32x16, u32x16};
 
 /// The same eight values in both halves.
 #[inline(always)]
@@ -16,6 +16,12 @@ pub fn twice(v: f32x8) -> f32x16 {
 #[inline(always)]
 pub fn signs(v: f32x16) -> u32 {
     v.to_bitmask()
+}
+
+/// Positions that hold `wanted`, as bits.
+#[inline(always)]
+pub fn positions(list: &[u32; 16], wanted: u32) -> u32 {
+    u32x16::new(*list).simd_eq(u32x16::splat(wanted)).to_bitmask()
 }
 
 /// The least of eight keys and its first position.
@@ -189,7 +195,9 @@ mod tests {
     }
 
     #[test]
-    fn signs_and_halves() {
+    fn signs_positions_and_halves() {
+        let list = std::array::from_fn(|i| if i % 5 == 1 { u32::MAX } else { i as u32 });
+        assert_eq!((positions(&list, u32::MAX), positions(&list, 10), positions(&list, 1)), (0x0842, 1 << 10, 0));
         let v = f32x16::new(std::array::from_fn(|i| if i % 3 == 0 { -0.0 } else { f32::INFINITY }));
         assert_eq!(signs(v), 0b1001_0010_0100_1001);
         let half = f32x8::new([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);

@@ -1,7 +1,7 @@
 //! What the rays of a block have in common: the point they start from, or (any-hit) the point they end in.
 
 use super::{BLOCK, GROUPS, HALF_ULP, Mask, V, select};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
+use crate::lanes::{LaneMask, Lanes, Lanes3};
 use crate::ray::{Packet, Rays};
 
 /// Directions and coordinates the tile's arithmetic is made for. Rays outside are left to the packet kernel.

@@ -3,8 +3,9 @@
 use super::bundle::Bundle;
 use super::groups::{Groups, NO_SLOT, bounded};
 use super::{Mask, V, select};
+use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes};
-use crate::ray::{Candidate, HitPacket, Packet};
+use crate::ray::{Candidate, HitPacket, INVALID_ID, Packet};
 use crate::scene::world::Object;
 use crate::shape::Triangle;
 
@@ -15,6 +16,16 @@ pub struct Exact<'a> {
     pub bundle: &'a Bundle<'a>,
     /// The triangles.
     pub object: &'a Object<f32>,
+}
+
+/// A group's final hits.
+#[derive(Debug)]
+pub struct Final {
+    /// The hits.
+    pub hit: HitPacket<V>,
+    /// Lanes where the common formula denies what the tile found: none, if the error bounds of the tile's arithmetic
+    /// hold.
+    pub denied: u32,
 }
 
 impl Exact<'_> {
@@ -30,36 +41,37 @@ impl Exact<'_> {
         Triangle::intersect(packet, &numbers, lanes, |candidate, lanes| found(candidate, lanes, prim));
     }
 
-    /// Writes what the common formula says of a group's winners into `hit`. Returns lanes where it denies the hit:
-    /// none, if the error bounds of the tile's arithmetic hold.
+    /// The final hits of a group: what the common formula says of its winners.
     #[inline(always)]
-    pub fn commit(&self, groups: &Groups, g: usize, packet: &Packet<V>, hit: &mut HitPacket<V>) -> u32 {
+    pub fn finish(&self, groups: &Groups, g: usize, packet: &Packet<V>, t_max: V) -> Final {
         let slots = &groups.slot[g];
-        let mut rest = 0;
-        for lane in 0..V::N {
-            rest |= u32::from(slots[lane] != NO_SLOT) << lane;
-        }
+        let none = V::splat(f32::from_bits(INVALID_ID));
+        let zero = V::constant(0.0);
+        let (mut t, mut u, mut v, mut prims) = (t_max, zero, zero, none);
+        let mut rest = !positions(slots, NO_SLOT) & V::ALL;
         let mut denied = rest;
         while rest != 0 {
             let slot = slots[rest.trailing_zeros() as usize & 15];
-            let same = lanes_with(slots, slot);
+            let same = positions(slots, slot);
             rest &= !same;
             self.meet(packet, slot, same, |found, lanes, prim| {
-                hit.commit(lanes, found, prim, 0);
-                denied &= !(found.hit & found.t.cmp_le(hit.t)).bits() | !lanes;
+                let taken = found.hit & found.t.cmp_le(t_max) & Mask::from_bits(lanes);
+                t = select(taken, found.t, t);
+                u = select(taken, found.u, u);
+                v = select(taken, found.v, v);
+                // Numbers are moved as floats: selection copies bits.
+                prims = select(taken, V::splat(f32::from_bits(prim)), prims);
+                denied &= !taken.bits();
             });
         }
-        denied
+        let mut hit = HitPacket::new(t);
+        (hit.u, hit.v) = (u, v);
+        hit.prim = bytemuck::cast(prims.to_array());
+        for lane in 0..V::N {
+            hit.inst[lane] = if hit.prim[lane] == INVALID_ID { INVALID_ID } else { 0 };
+        }
+        Final { hit, denied }
     }
-}
-
-#[inline(always)]
-fn lanes_with(slots: &[u32; 16], slot: u32) -> u32 {
-    let mut lanes = 0;
-    for lane in 0..V::N {
-        lanes |= u32::from(slots[lane] == slot) << lane;
-    }
-    lanes
 }
 
 /// Decides by the common formula whether a triangle is hit by `lanes` of a group, and whether it is nearer than what
@@ -86,15 +98,10 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slo
     }
     let (_, prim) = exact.triangle(slot);
     let mut wins = hits;
-    let mut rest = hits;
-    for lane in 0..V::N {
-        if groups.slot[g][lane] == NO_SLOT {
-            rest &= !(1 << lane);
-        }
-    }
+    let mut rest = hits & !positions(&groups.slot[g], NO_SLOT);
     while rest != 0 {
         let old = groups.slot[g][rest.trailing_zeros() as usize & 15];
-        let same = rest & lanes_with(&groups.slot[g], old);
+        let same = rest & positions(&groups.slot[g], old);
         rest &= !same;
         exact.meet(&packet, old, same, |found, lanes, old_prim| {
             let nearer = t.cmp_lt(found.t).bits();

@@ -164,8 +164,8 @@ impl Job<'_> {
             return;
         }
         let (packet, t_max, _) = Packet::<V>::load(self.rays, first);
-        let mut hit = HitPacket::new(t_max);
-        odd |= exact.commit(groups, g, &packet, &mut hit);
+        let exact::Final { mut hit, denied } = exact.finish(groups, g, &packet, t_max);
+        odd |= denied;
         if odd != 0 {
             hit = self.rest::<ANY, COUNT>(first, odd, Some(hit)).0;
         }
