@@ -11,7 +11,7 @@ use lanecast::ray::{Counters, Hits, Rays};
 use lanecast::scene::description::{Description, Item, ItemKind};
 use lanecast::scene::world::{Preset, World};
 use lanecast::scene::{ply, unpack};
-use lanecast::trace::{Engine, Engines, Scratch, engine};
+use lanecast::trace::{Engine, Scratch, engine};
 
 type Failure = Box<dyn std::error::Error>;
 

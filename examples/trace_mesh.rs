@@ -16,11 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::path::PathBuf::from(std::env::args().nth(1).ok_or("usage: trace_mesh MESH.ply")?);
     let mut scene = Description::new("mesh");
     scene.meshes.push(Arc::new(ply::parse(&path, &unpack::read_file(&path)?)?));
-    scene.groups[0].items.push(Item {
-        transform: DAffine3::IDENTITY,
-        material: None,
-        kind: ItemKind::Mesh(0),
-    });
+    scene.groups[0].items.push(Item { transform: DAffine3::IDENTITY, material: None, kind: ItemKind::Mesh(0) });
     let world = World::<f32>::compile(&scene, Preset::Balanced)?;
     println!("{:?}", world.stats());
 

@@ -245,7 +245,8 @@ fn counts_and_repeats() {
 
 #[test]
 fn hard_meshes() {
-    for name in ["needles", "duplicates_x64", "denormal", "huge_range", "flat_grid", "exponential", "teapot_in_stadium"] {
+    for name in ["needles", "duplicates_x64", "denormal", "huge_range", "flat_grid", "exponential", "teapot_in_stadium"]
+    {
         let file = format!("../shared/scenes/pathological/{name}.ply");
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
         let Ok(bytes) = unpack::read_file(&path) else {

@@ -3,7 +3,8 @@
 //! portable form bit by bit.
 #![allow(unsafe_code, reason = "instructions no crate offers as safe functions")]
 
-use wide::{f32x8, f32x16, u32x16};
+use super::{LaneMask, Lanes};
+use wide::{f32x4, f32x8, f32x16, u16x8, u32x16};
 
 /// The same eight values in both halves.
 #[inline(always)]
@@ -37,6 +38,34 @@ pub fn least_key(keys: &[u16; 8]) -> (u16, usize) {
     }
     #[cfg(not(target_feature = "sse4.1"))]
     least_key_portable(keys)
+}
+
+/// The keys with the one at `position` made the greatest possible. Written as one vector: the next look for the
+/// least key would have to wait for a single lane's store.
+#[inline(always)]
+pub fn without_key(keys: &[u16; 8], position: usize) -> [u16; 8] {
+    const OWN: u16x8 = u16x8::new([0, 1, 2, 3, 4, 5, 6, 7]);
+    (u16x8::new(*keys) | u16x8::splat(position as u16).simd_eq(OWN)).to_array()
+}
+
+/// The upper halves of the bits of the numbers in `wanted`, all ones elsewhere: keys in the order of the numbers, if
+/// none is negative.
+#[inline(always)]
+pub fn upper_halves(v: f32x8, wanted: u32) -> [u16; 8] {
+    let wanted = <<f32x8 as Lanes>::Mask as LaneMask>::from_bits(wanted);
+    let all_ones = f32x8::splat(f32::from_bits(u32::MAX));
+    let marked: [f32; 8] = <f32x8 as Lanes>::select(wanted, v, all_ones).to_array();
+    marked.map(|x| (x.to_bits() >> 16) as u16)
+}
+
+/// The least lane. No NaNs.
+#[inline(always)]
+pub fn least(v: f32x16) -> f32 {
+    let [a, b]: [f32x8; 2] = bytemuck::cast(v.to_array());
+    let [a, b]: [f32x4; 2] = bytemuck::cast(a.fast_min(b).to_array());
+    let [x, y, z, w] = a.fast_min(b).to_array();
+    let lesser = |x: f32, y: f32| if x < y { x } else { y };
+    lesser(lesser(x, z), lesser(y, w))
 }
 
 #[cfg(any(test, not(target_feature = "sse4.1")))]
@@ -161,6 +190,9 @@ mod tests {
             let least = *keys.iter().min().unwrap();
             let want = (least, keys.iter().position(|&k| k == least).unwrap());
             assert_eq!((least_key(&keys), least_key_portable(&keys)), (want, want));
+            let mut rest = keys;
+            rest[want.1] = u16::MAX;
+            assert_eq!(without_key(&keys, want.1), rest);
         }
     }
 
@@ -178,8 +210,15 @@ mod tests {
             let vectors = rows.map(f32x16::new);
             let want = rows.map(|row| row.into_iter().fold(f32::INFINITY, f32::min).to_bits());
             assert_eq!(row_minima(&vectors).to_array().map(f32::to_bits), want);
+            assert_eq!(vectors.map(least).map(f32::to_bits), want);
             assert_eq!(row_minima_portable(&vectors).to_array().map(f32::to_bits), want);
         }
+    }
+
+    #[test]
+    fn upper_halves_keep_the_order() {
+        let v = f32x8::new([0.0, 1.0, 2.5, 1e-30, 7e30, f32::INFINITY, 1.0, 3.0]);
+        assert_eq!(upper_halves(v, 0x6f), [0, 0x3f80, 0x4020, 0x0da2, 0xffff, 0x7f80, 0x3f80, 0xffff]);
     }
 
     #[test]

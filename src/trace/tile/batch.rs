@@ -124,7 +124,8 @@ impl Batch {
         let back = volume.cmp_lt(zero);
         let pick = |x: V, wild: V| select(tame, x, wild);
         let faced = |x: V| pick(select(back, -x, x), zero);
-        let inverse = [pick(normal[0] * rcp, zero), pick(normal[1] * rcp, zero), pick(normal[2] * rcp, V::splat(f32::MAX))];
+        let inverse =
+            [pick(normal[0] * rcp, zero), pick(normal[1] * rcp, zero), pick(normal[2] * rcp, V::splat(f32::MAX))];
         let linear = [edges[0].map(faced), edges[1].map(faced), edges[2].map(faced), inverse];
         let one = V::constant(1.0);
         let (most, least) = (pick(one + rho, one), pick(one - rho, zero));

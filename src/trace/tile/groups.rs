@@ -3,7 +3,7 @@
 use super::bundle::{At, Bundle, Shared, load3};
 use super::frame::Frame;
 use super::{GROUPS, HALF_ULP, Mask, V, select};
-use crate::lanes::words::row_minima;
+use crate::lanes::words::{least, row_minima};
 use crate::lanes::{LaneMask, Lanes, Lanes3};
 use crate::math::Aabb;
 
@@ -103,7 +103,7 @@ impl Groups {
     pub fn load(&mut self, bundle: &Bundle, groups: u32, scene: &Aabb<f32>) -> bool {
         let Some(frame) = Frame::of(bundle, groups, scene) else { return false };
         self.frame = frame;
-        let (most, none) = (V::splat(f32::INFINITY), V::splat(f32::NEG_INFINITY));
+        let most = V::splat(f32::INFINITY);
         let mut lows = [[most; GROUPS]; 2];
         // Greatest values as least negatives: one kind of shuffle tree does both.
         let mut highs = [[most; GROUPS]; 2];
@@ -132,14 +132,14 @@ impl Groups {
             self.inv_hi[g] = select(lanes, lines.far, most);
         }
         self.rect = [0, 1].map(|axis| [row_minima(&lows[axis]), -row_minima(&highs[axis])]);
-        self.bounds = self.rect.map(|r| [least(r[0]), greatest(r[1], none)]);
+        self.bounds = self.rect.map(|r| [least(r[0]), greatest(r[1])]);
         self.wide = self.bounds.iter().flatten().fold(0.0, |w, x| x.abs().max(w));
         self.part = [0, 1].map(|axis| {
             let [lo, hi] = self.bounds[axis];
             let scale = V::splat(if hi > lo { 1.0 / (hi - lo) } else { 0.0 });
             self.rect[axis].map(|edge| (edge - V::splat(lo)) * scale)
         });
-        self.loosen(near, least(-reach).abs(), bundle.slack);
+        self.loosen(near, greatest(reach), bundle.slack);
         self.refresh();
         true
     }
@@ -207,7 +207,7 @@ impl Groups {
         // A little farther than the reciprocal, whatever its rounding.
         let far = V::splat(1.0 + 4.0 * HALF_ULP) / self.least;
         self.far = select(waiting, far, none);
-        self.farthest = greatest(self.far, none);
+        self.farthest = greatest(self.far);
         self.nearest = least(self.least);
     }
 }
@@ -220,11 +220,6 @@ pub fn bounded(inv_lo: V) -> V {
 }
 
 #[inline(always)]
-fn least(v: V) -> f32 {
-    v.to_array().into_iter().fold(f32::INFINITY, |a, b| if b < a { b } else { a })
-}
-
-#[inline(always)]
-fn greatest(v: V, none: V) -> f32 {
-    v.to_array().into_iter().fold(none.lane(0), |a, b| if b > a { b } else { a })
+fn greatest(v: V) -> f32 {
+    -least(-v)
 }

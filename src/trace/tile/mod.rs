@@ -105,8 +105,7 @@ impl Job<'_> {
             let bundle = object.and_then(|object| Some((object, Bundle::find(self.rays, first, ANY)?)));
             match bundle {
                 Some((object, bundle)) => self.block::<ANY, COUNT>(object, &bundle),
-                None => (0..bundle::groups(self.rays, first))
-                    .for_each(|g| self.packet::<ANY, COUNT>(first + g * V::N)),
+                None => (0..bundle::groups(self.rays, first)).for_each(|g| self.packet::<ANY, COUNT>(first + g * V::N)),
             }
         }
     }

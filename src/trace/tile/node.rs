@@ -10,7 +10,7 @@
 use super::groups::Groups;
 use super::{HALF_ULP, V};
 use crate::bvh::{Node, WIDTH};
-use crate::lanes::words::{signs, twice};
+use crate::lanes::words::{signs, twice, upper_halves, without_key};
 use crate::lanes::{LaneMask, Lanes, f32x8};
 
 /// Half a vector: the eight children of a node.
@@ -58,9 +58,6 @@ impl Default for Level {
         Self { edges: [[0.0; 16]; 4], near: [0.0; WIDTH], keys: [u16::MAX; WIDTH], node: 0, groups: 0 }
     }
 }
-
-/// A key that no child has.
-const NONE: u16 = u16::MAX;
 
 /// The key of a depth: order of keys is order of depths, coarsely.
 #[inline(always)]
@@ -131,11 +128,9 @@ impl Planes {
         right.store(&mut level.edges[1]);
         below.store(&mut level.edges[2]);
         above.store(&mut level.edges[3]);
-        let near = (mz - rz).to_array();
-        level.near = near;
-        for child in 0..WIDTH {
-            level.keys[child] = if met >> child & 1 != 0 { key(near[child]) } else { NONE };
-        }
+        let near = mz - rz;
+        level.near = near.to_array();
+        level.keys = upper_halves(near.fast_max(zero), met);
         true
     }
 }
@@ -158,7 +153,7 @@ impl Level {
     /// Takes a child off the list.
     #[inline(always)]
     pub fn remove(&mut self, child: usize) {
-        self.keys[child] = NONE;
+        self.keys = without_key(&self.keys, child);
     }
 }
 

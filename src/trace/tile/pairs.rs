@@ -65,8 +65,7 @@ fn list(seen: u32, wanted: &[u32], groups: &Groups, planes: &Planes, pairs: &mut
             x.mul_add(s, y.mul_add(t, z))
         };
         let edge = largest(0).fast_min(largest(1)).fast_min(largest(2));
-        let met = V::splat(planes.outside[i]).cmp_le(edge)
-            & groups.least.cmp_le(largest(3) * V::splat(planes.most[i]));
+        let met = V::splat(planes.outside[i]).cmp_le(edge) & groups.least.cmp_le(largest(3) * V::splat(planes.most[i]));
         let mask = met.bits() & wanted[i];
         let at = count.min(256);
         let Some(list) = pairs.group[at..].first_chunk_mut() else { break };
@@ -90,10 +89,8 @@ fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usiz
     let inv_z = value(3);
     let (hi, lo) = (inv_z * V::splat(planes.most[i]), inv_z * V::splat(planes.least[i]));
     let possible = V::splat(planes.outside[i]).cmp_le(edge) & inv_lo.cmp_le(hi);
-    let certain = possible
-        & V::splat(planes.inside[i]).cmp_le(edge)
-        & inv_hi.cmp_lt(lo)
-        & hi.cmp_lt(V::splat(groups.cap));
+    let certain =
+        possible & V::splat(planes.inside[i]).cmp_le(edge) & inv_hi.cmp_lt(lo) & hi.cmp_lt(V::splat(groups.cap));
     if ANY {
         groups.inv_lo[g] = select(certain, V::splat(f32::INFINITY), inv_lo);
         groups.done[g] |= certain.bits();
