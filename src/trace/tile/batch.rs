@@ -93,63 +93,73 @@ impl Batch {
         let apex = groups.frame.apex.map(V::splat);
         let p: [Lanes3<V>; 3] = [0, 1, 2].map(|i| {
             let corner = [0, 1, 2].map(|a| V::load(&self.corners[3 * i + a]) - apex[a]);
-            groups.frame.into_frame(corner)
+            groups.frame.coordinates(corner)
         });
-        let edges = [cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])];
         let (d1, d2) = (minus(p[1], p[0]), minus(p[2], p[0]));
         let normal = cross(d1, d2);
         let volume = dot(normal, p[0]);
         let rcp = V::constant(1.0) / volume;
-
-        let largest = |f: &dyn Fn(Lanes3<V>) -> V| f(p[0]).fast_max(f(p[1])).fast_max(f(p[2]));
-        let distance = largest(&sum);
-        let wide = V::splat(groups.wide);
-        let spread = largest(&|q: Lanes3<V>| wide.mul_add(q[2].abs(), q[0].abs().fast_max(q[1].abs())));
         let length = sum(d1).fast_max(sum(d2)).fast_max(sum(minus(d2, d1)));
-        let moved = distance.mul_add(V::splat(MOVED * HALF_ULP), V::splat(groups.slack));
-        let slant = 1.0 + 1.5 * groups.wide;
-        let eps = moved * length * V::splat(2.0 * slant * slant)
-            + spread * spread * V::splat(8.0 * HALF_ULP)
-            + V::splat(f32::MIN_POSITIVE);
-        // Corners that move by `moved` move the plane no farther; 8 half ulps for the products of either formula,
-        // which are as large as the sides, and for the dot products.
-        let products = V::splat(8.0 * HALF_ULP);
-        let area = sum(normal);
-        let shift = area * products.mul_add(distance, moved) + products * length * length * length;
-        let rho = (shift * rcp.abs()).mul_add(V::splat(slant), V::splat(MOVED * HALF_ULP));
+        let (eps, rho) = doubt(groups, &p, length, sum(normal), rcp);
 
         // Triangles seen (nearly) edge-on have no side and no depth: met everywhere, certain nowhere.
         let tame = rho.cmp_lt(V::splat(WILD));
-        let zero = V::constant(0.0);
+        let (zero, one) = (V::constant(0.0), V::constant(1.0));
         let back = volume.cmp_lt(zero);
         let pick = |x: V, wild: V| select(tame, x, wild);
         let faced = |x: V| pick(select(back, -x, x), zero);
-        let inverse =
-            [pick(normal[0] * rcp, zero), pick(normal[1] * rcp, zero), pick(normal[2] * rcp, V::splat(f32::MAX))];
+        let [x, y, z] = normal.map(|n| n * rcp);
+        let inverse = [pick(x, zero), pick(y, zero), pick(z, V::splat(f32::MAX))];
+        let edges = [cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])];
         let linear = [edges[0].map(faced), edges[1].map(faced), edges[2].map(faced), inverse];
-        let one = V::constant(1.0);
-        let (most, least) = (pick(one + rho, one), pick(one - rho, zero));
+        let most = pick(one + rho, one);
+        (-eps).store(&mut planes.outside);
+        pick(eps, V::splat(f32::INFINITY)).store(&mut planes.inside);
+        most.store(&mut planes.most);
+        pick(one - rho, zero).store(&mut planes.least);
+        planes.store(groups, &linear, eps, most) & ((1u32 << self.len) - 1)
+    }
+}
 
+impl Planes {
+    /// Keeps the linear functions; returns the triangles whose largest values over the tile do not rule them out.
+    #[inline(always)]
+    fn store(&mut self, groups: &Groups, linear: &[Lanes3<V>; 4], eps: V, most: V) -> u32 {
+        let zero = V::constant(0.0);
+        let [[s0, s1], [t0, t1]] = groups.bounds.map(|b| b.map(V::splat));
         let mut seen = V::splat(f32::INFINITY);
         for (k, f) in linear.iter().enumerate() {
             let negative = [f[0].cmp_lt(zero), f[1].cmp_lt(zero)];
-            planes.negative[k] = negative.map(LaneMask::bits);
-            // The function's largest value over the tile.
-            let [[s0, s1], [t0, t1]] = groups.bounds.map(|b| b.map(V::splat));
+            self.negative[k] = negative.map(LaneMask::bits);
             let (s, t) = (select(negative[0], s0, s1), select(negative[1], t0, t1));
             let value = f[0].mul_add(s, f[1].mul_add(t, f[2]));
             let margin = if k < 3 { value + eps } else { value * most - V::splat(groups.nearest) };
             seen = seen.fast_min(margin);
-            for (to, x) in planes.linear[k].iter_mut().zip(f) {
+            for (to, x) in self.linear[k].iter_mut().zip(f) {
                 x.store(to);
             }
         }
-        (-eps).store(&mut planes.outside);
-        pick(eps, V::splat(f32::INFINITY)).store(&mut planes.inside);
-        most.store(&mut planes.most);
-        least.store(&mut planes.least);
-        zero.cmp_le(seen).bits() & ((1u32 << self.len) - 1)
+        zero.cmp_le(seen).bits()
     }
+}
+
+/// How far edge functions (absolute) and 1/z (relative) may be from those of the common formula. `length` is the
+/// longest side, `area` the size of the normal, `rcp` the reciprocal of normal times corner.
+#[inline(always)]
+fn doubt(groups: &Groups, p: &[Lanes3<V>; 3], length: V, area: V, rcp: V) -> (V, V) {
+    let largest = |f: &dyn Fn(Lanes3<V>) -> V| f(p[0]).fast_max(f(p[1])).fast_max(f(p[2]));
+    let distance = largest(&sum);
+    let wide = V::splat(groups.wide);
+    let spread = largest(&|q: Lanes3<V>| wide.mul_add(q[2].abs(), q[0].abs().fast_max(q[1].abs())));
+    let moved = distance.mul_add(V::splat(MOVED * HALF_ULP), V::splat(groups.slack));
+    // At the depth of a corner, a ray off the axis magnifies what is along the axis.
+    let slant = 1.0 + 1.5 * groups.wide;
+    let products = V::splat(8.0 * HALF_ULP);
+    let eps = moved * length * V::splat(2.0 * slant * slant) + spread * spread * products + V::splat(f32::MIN_POSITIVE);
+    // Corners that move by `moved` move the plane no farther; 8 half ulps for the products of either formula, which
+    // are as large as the sides, and for the dot products.
+    let shift = area * products.mul_add(distance, moved) + products * length * length * length;
+    (eps, (shift * rcp.abs()).mul_add(V::splat(slant), V::splat(MOVED * HALF_ULP)))
 }
 
 #[inline(always)]

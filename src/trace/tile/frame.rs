@@ -96,9 +96,9 @@ impl Frame {
         sums
     }
 
-    /// Vectors into the frame.
+    /// Vectors in this frame.
     #[inline(always)]
-    pub fn into_frame(&self, d: Lanes3<V>) -> Lanes3<V> {
+    pub fn coordinates(&self, d: Lanes3<V>) -> Lanes3<V> {
         self.axes.map(|axis| dot(d, axis.map(V::splat)))
     }
 }

@@ -149,8 +149,8 @@ impl Groups {
     fn loosen(&mut self, near: V, reach: f32, slack: f32) {
         let loose = self.loose();
         for g in 0..GROUPS {
-            self.inv_lo[g] = self.inv_lo[g] * V::splat(1.0 - loose);
-            self.inv_hi[g] = self.inv_hi[g] * V::splat(1.0 + loose);
+            self.inv_lo[g] *= V::splat(1.0 - loose);
+            self.inv_hi[g] *= V::splat(1.0 + loose);
         }
         self.cap = least(near) * (1.0 - loose);
         self.slack = (slack + 8.0 * HALF_ULP * reach) * self.frame.scale;
@@ -174,7 +174,7 @@ impl Groups {
                 [0, 1, 2].map(|a| org[a] - V::splat(bundle.apex[a]))
             }
         };
-        let [x, y, speed] = self.frame.into_frame(direction);
+        let [x, y, speed] = self.frame.coordinates(direction);
         let slowness = one / speed;
         let (s, t) = (x * slowness, y * slowness);
         let (widest, most) = (V::splat(WIDEST), V::splat(f32::MAX));
