@@ -144,6 +144,31 @@ fn rays_aimed_at_vertices_and_edges() {
     }
 }
 
+/// At a free edge no neighbour takes what a triangle leaves: here a wrong sign is a wrong answer.
+#[test]
+fn rays_aimed_at_free_edges() {
+    let mut r = Random(21);
+    let mesh = soup(400, &mut r);
+    let world = compile(vec![mesh.clone()]);
+    let mut doubtful = 0;
+    for triangle in &mesh.triangles {
+        let corner = triangle.map(|v| mesh.positions[v as usize]);
+        let away = corner[0] + r.in_cube() * [0.5, 3.0, 30.0][r.below(3)];
+        let (mut forth, mut back) = (Rays::new(256), Rays::new(256));
+        for i in 0..256 {
+            let target = corner[i % 3].lerp(corner[(i + 1) % 3], r.unit());
+            let (eye, way) = (away.as_vec3(), (target - away).as_vec3());
+            forth.set(i, eye.to_array(), way.to_array(), 0.0, f32::INFINITY);
+            // The same line from behind the triangle to a light in the same place.
+            let org = eye + way * 1.25;
+            back.set(i, org.to_array(), (eye - org).to_array(), 0.0, 1.0);
+        }
+        assert_eq!((differences(&world, &forth), differences(&world, &back)), ((0, 0), (0, 0)));
+        doubtful += 512;
+    }
+    println!("{doubtful} rays along free edges, all bits equal");
+}
+
 #[test]
 fn nothing_escapes_from_a_closed_ball() {
     let world = compile(vec![ball(60, 80)]);
