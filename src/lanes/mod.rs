@@ -19,6 +19,7 @@ mod scalar;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 mod startup;
 mod vector;
+pub mod words;
 
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};

@@ -1,12 +1,14 @@
 //! The engines behind one trait.
 //!
 //! All generic engines run the same kernels at different widths: `brute` and `scalar` at width 1 (without and with
-//! the tree), `packetN` at N lanes. Their hits are equal to the last bit; [`crate::ray::slab`] says why.
+//! the tree), `packetN` at N lanes. Their hits are equal to the last bit; [`crate::ray::slab`] says why. `tile` has its
+//! own arithmetic and the same hits: where rounding could tell, it asks the common kernel.
 
 mod brute;
 mod bundle;
 mod leaf;
 mod query;
+mod tile;
 mod traverse;
 
 use std::marker::PhantomData;
@@ -22,6 +24,7 @@ use query::{Query, Stack};
 pub struct Scratch {
     single: Stack<f32>,
     double: Stack<f64>,
+    tile: Box<tile::Memory>,
 }
 
 /// A complete path from rays to hits.
@@ -71,6 +74,7 @@ impl Engines for f32 {
             &Generic::<f32x4, true>("packet4", PhantomData),
             &Generic::<f32x8, true>("packet8", PhantomData),
             &Generic::<f32x16, true>("packet16", PhantomData),
+            &tile::Tile,
         ]
     }
 

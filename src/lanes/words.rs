@@ -1,0 +1,246 @@
+//! Words of the machine that [`super::Lanes`] does not have: what the tile engine needs beside arithmetic. Each has
+//! one meaning; where a build has an instruction for it, that instruction is used, and a test compares it with the
+//! portable form bit by bit.
+#![allow(unsafe_code, reason = "instructions no crate offers as safe functions")]
+
+use super::{LaneMask, Lanes};
+use wide::{f32x4, f32x8, f32x16, u16x8, u32x16};
+
+/// The same eight values in both halves.
+#[inline(always)]
+pub fn twice(v: f32x8) -> f32x16 {
+    let [a, b, c, d, e, f, g, h] = v.to_array();
+    f32x16::new([a, b, c, d, e, f, g, h, a, b, c, d, e, f, g, h])
+}
+
+/// The sign bits, bit `i` for lane `i`; also of zeros and NaNs.
+#[inline(always)]
+pub fn signs(v: f32x16) -> u32 {
+    v.to_bitmask()
+}
+
+/// Positions that hold `wanted`, as bits.
+#[inline(always)]
+pub fn positions(list: &[u32; 16], wanted: u32) -> u32 {
+    u32x16::new(*list).simd_eq(u32x16::splat(wanted)).to_bitmask()
+}
+
+/// The least of eight keys and its first position.
+#[inline(always)]
+pub fn least_key(keys: &[u16; 8]) -> (u16, usize) {
+    #[cfg(target_feature = "sse4.1")]
+    {
+        use std::arch::x86_64::{__m128i, _mm_cvtsi128_si32, _mm_minpos_epu16};
+        let keys = bytemuck::cast::<[u16; 8], __m128i>(*keys);
+        // SAFETY: compiled only where the whole build has SSE4.1; the instruction touches registers only.
+        let found = unsafe { _mm_cvtsi128_si32(_mm_minpos_epu16(keys)) } as u32;
+        (found as u16, (found >> 16) as usize & 7)
+    }
+    #[cfg(not(target_feature = "sse4.1"))]
+    least_key_portable(keys)
+}
+
+/// The keys with the one at `position` made the greatest possible. Written as one vector: the next look for the
+/// least key would have to wait for a single lane's store.
+#[inline(always)]
+pub fn without_key(keys: &[u16; 8], position: usize) -> [u16; 8] {
+    const OWN: u16x8 = u16x8::new([0, 1, 2, 3, 4, 5, 6, 7]);
+    (u16x8::new(*keys) | u16x8::splat(position as u16).simd_eq(OWN)).to_array()
+}
+
+/// The upper halves of the bits of the numbers in `wanted`, all ones elsewhere: keys in the order of the numbers, if
+/// none is negative.
+#[inline(always)]
+pub fn upper_halves(v: f32x8, wanted: u32) -> [u16; 8] {
+    let wanted = <<f32x8 as Lanes>::Mask as LaneMask>::from_bits(wanted);
+    let all_ones = f32x8::splat(f32::from_bits(u32::MAX));
+    let marked: [f32; 8] = <f32x8 as Lanes>::select(wanted, v, all_ones).to_array();
+    marked.map(|x| (x.to_bits() >> 16) as u16)
+}
+
+/// The least lane. No NaNs.
+#[inline(always)]
+pub fn least(v: f32x16) -> f32 {
+    let [a, b]: [f32x8; 2] = bytemuck::cast(v.to_array());
+    let [a, b]: [f32x4; 2] = bytemuck::cast(a.fast_min(b).to_array());
+    let [x, y, z, w] = a.fast_min(b).to_array();
+    let lesser = |x: f32, y: f32| if x < y { x } else { y };
+    lesser(lesser(x, z), lesser(y, w))
+}
+
+#[cfg(any(test, not(target_feature = "sse4.1")))]
+fn least_key_portable(keys: &[u16; 8]) -> (u16, usize) {
+    let mut best = 0;
+    for i in 1..8 {
+        if keys[i] < keys[best] {
+            best = i;
+        }
+    }
+    (keys[best], best)
+}
+
+/// Lane `i` of the result is the least value of row `i`. No NaNs.
+#[inline(always)]
+pub fn row_minima(rows: &[f32x16; 16]) -> f32x16 {
+    #[cfg(target_feature = "avx512f")]
+    {
+        avx512::row_minima(rows)
+    }
+    #[cfg(not(target_feature = "avx512f"))]
+    row_minima_portable(rows)
+}
+
+#[cfg(any(test, not(target_feature = "avx512f")))]
+fn row_minima_portable(rows: &[f32x16; 16]) -> f32x16 {
+    f32x16::new(std::array::from_fn(|i| {
+        let mut half = rows[i].to_array();
+        for step in [8, 4, 2, 1] {
+            for k in 0..step {
+                half[k] = if half[k] < half[k + step] { half[k] } else { half[k + step] };
+            }
+        }
+        half[0]
+    }))
+}
+
+/// Writes the positions of the set bits of a 16-bit mask to the front of `list`, ascending; what follows them is
+/// unspecified. Returns how many there are.
+#[inline(always)]
+pub fn list_bits(mask: u32, list: &mut [u8; 16]) -> usize {
+    #[cfg(all(target_feature = "avx512vbmi2", target_feature = "avx512vl"))]
+    {
+        use std::arch::x86_64::{__m128i, _mm_maskz_compress_epi8};
+        const POSITIONS: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+        let all = bytemuck::cast::<[u8; 16], __m128i>(POSITIONS);
+        // SAFETY: compiled only where the whole build has VBMI2 and VL; the instruction touches registers only.
+        *list = bytemuck::cast(unsafe { _mm_maskz_compress_epi8(mask as u16, all) });
+        (mask & 0xffff).count_ones() as usize
+    }
+    #[cfg(not(all(target_feature = "avx512vbmi2", target_feature = "avx512vl")))]
+    list_bits_portable(mask, list)
+}
+
+#[cfg(any(test, not(all(target_feature = "avx512vbmi2", target_feature = "avx512vl"))))]
+fn list_bits_portable(mask: u32, list: &mut [u8; 16]) -> usize {
+    let mut rest = mask & 0xffff;
+    let mut count = 0;
+    while rest != 0 {
+        list[count] = rest.trailing_zeros() as u8;
+        rest &= rest - 1;
+        count += 1;
+    }
+    count
+}
+
+/// A 16x16 tree of shuffles: 45 instructions instead of 16 reductions.
+#[cfg(target_feature = "avx512f")]
+mod avx512 {
+    use std::arch::x86_64::{_mm512_loadu_ps, _mm512_min_ps, _mm512_shuffle_f32x4, _mm512_shuffle_ps};
+    use std::arch::x86_64::{_mm512_storeu_ps, _mm512_unpackhi_ps, _mm512_unpacklo_ps};
+    use wide::f32x16;
+
+    #[inline(always)]
+    pub fn row_minima(rows: &[f32x16; 16]) -> f32x16 {
+        let mut minima = [0.0; 16];
+        // SAFETY: compiled only where the whole build has AVX-512F. Every load reads the 64 bytes of one row, which
+        // is a vector of 16 floats; the store fills the 64 bytes of `minima`.
+        unsafe {
+            let row = |i: usize| _mm512_loadu_ps((&raw const rows[i]).cast::<f32>());
+            // Quarters of two rows folded into one register: 0 and 1 from the first, 2 and 3 from the second.
+            let fold = |i: usize| {
+                let (a, b) = (row(i), row(i + 8));
+                _mm512_min_ps(_mm512_shuffle_f32x4::<0x44>(a, b), _mm512_shuffle_f32x4::<0xee>(a, b))
+            };
+            // One quarter each of rows i, i + 8, i + 4, i + 12.
+            let quarters = |i: usize| {
+                let (a, b) = (fold(i), fold(i + 4));
+                _mm512_min_ps(_mm512_shuffle_f32x4::<0x88>(a, b), _mm512_shuffle_f32x4::<0xdd>(a, b))
+            };
+            let pairs = |i: usize| {
+                let (a, b) = (quarters(i), quarters(i + 1));
+                _mm512_min_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b))
+            };
+            let (a, b) = (pairs(0), pairs(2));
+            let all = _mm512_min_ps(_mm512_shuffle_ps::<0x44>(a, b), _mm512_shuffle_ps::<0xee>(a, b));
+            // Rows 0..4, 8..12, 4..8, 12..16 to their places.
+            _mm512_storeu_ps(minima.as_mut_ptr(), _mm512_shuffle_f32x4::<0xd8>(all, all));
+        }
+        f32x16::new(minima)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A small linear congruential generator: enough to shuffle bits.
+    fn numbers() -> impl FnMut() -> u32 {
+        let mut state = 12345u64;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 32) as u32
+        }
+    }
+
+    #[test]
+    fn the_least_key_is_the_first_of_the_least() {
+        let mut next = numbers();
+        for _ in 0..1000 {
+            let keys: [u16; 8] = std::array::from_fn(|_| (next() % 9) as u16 * 8191);
+            let least = *keys.iter().min().unwrap();
+            let want = (least, keys.iter().position(|&k| k == least).unwrap());
+            assert_eq!((least_key(&keys), least_key_portable(&keys)), (want, want));
+            let mut rest = keys;
+            rest[want.1] = u16::MAX;
+            assert_eq!(without_key(&keys, want.1), rest);
+        }
+    }
+
+    #[test]
+    fn row_minima_are_those_of_each_row() {
+        let mut next = numbers();
+        for _ in 0..200 {
+            let rows: [[f32; 16]; 16] = std::array::from_fn(|_| {
+                std::array::from_fn(|_| match next() % 8 {
+                    0 => f32::INFINITY,
+                    1 => f32::NEG_INFINITY,
+                    _ => next() as i32 as f32 * 1e-3,
+                })
+            });
+            let vectors = rows.map(f32x16::new);
+            let want = rows.map(|row| row.into_iter().fold(f32::INFINITY, f32::min).to_bits());
+            assert_eq!(row_minima(&vectors).to_array().map(f32::to_bits), want);
+            assert_eq!(vectors.map(least).map(f32::to_bits), want);
+            assert_eq!(row_minima_portable(&vectors).to_array().map(f32::to_bits), want);
+        }
+    }
+
+    #[test]
+    fn upper_halves_keep_the_order() {
+        let v = f32x8::new([0.0, 1.0, 2.5, 1e-30, 7e30, f32::INFINITY, 1.0, 3.0]);
+        assert_eq!(upper_halves(v, 0x6f), [0, 0x3f80, 0x4020, 0x0da2, 0xffff, 0x7f80, 0x3f80, 0xffff]);
+    }
+
+    #[test]
+    fn set_bits_are_listed_in_order() {
+        for mask in (0..0x1_0000u32).step_by(7).chain([0xffff, 0x8000]) {
+            let want: Vec<u8> = (0..16).filter(|i| mask >> i & 1 != 0).collect();
+            for list_bits in [list_bits, list_bits_portable] {
+                let mut list = [0xff; 16];
+                let count = list_bits(mask, &mut list);
+                assert_eq!(list[..count], want);
+            }
+        }
+    }
+
+    #[test]
+    fn signs_positions_and_halves() {
+        let list = std::array::from_fn(|i| if i % 5 == 1 { u32::MAX } else { i as u32 });
+        assert_eq!((positions(&list, u32::MAX), positions(&list, 10), positions(&list, 1)), (0x0842, 1 << 10, 0));
+        let v = f32x16::new(std::array::from_fn(|i| if i % 3 == 0 { -0.0 } else { f32::INFINITY }));
+        assert_eq!(signs(v), 0b1001_0010_0100_1001);
+        let half = f32x8::new([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+        assert_eq!(twice(half).to_array()[..8], half.to_array());
+        assert_eq!(twice(half).to_array()[8..], half.to_array());
+    }
+}

@@ -1,0 +1,123 @@
+//! Where the common formula has the word: doubtful pairs while a tile is traced, and the numbers of its final hits.
+
+use super::bundle::Bundle;
+use super::groups::{Groups, NO_SLOT, bounded};
+use super::{Mask, V, select};
+use crate::lanes::words::positions;
+use crate::lanes::{LaneMask, Lanes};
+use crate::ray::{Candidate, HitPacket, INVALID_ID, Packet};
+use crate::scene::world::Object;
+use crate::shape::Triangle;
+
+/// What the common formula needs: the rays as they came and the triangles as they are stored.
+#[derive(Debug)]
+pub struct Exact<'a> {
+    /// The rays.
+    pub bundle: &'a Bundle<'a>,
+    /// The triangles.
+    pub object: &'a Object<f32>,
+}
+
+/// A group's final hits.
+#[derive(Debug)]
+pub struct Final {
+    /// The hits.
+    pub hit: HitPacket<V>,
+    /// Lanes where the common formula denies what the tile found: none, if the error bounds of the tile's arithmetic
+    /// hold.
+    pub denied: u32,
+}
+
+impl Exact<'_> {
+    fn triangle(&self, slot: u32) -> ([f32; 9], u32) {
+        let block = &self.object.triangles[(slot >> 3) as usize];
+        (block.get((slot & 7) as usize), block.prim[(slot & 7) as usize])
+    }
+
+    /// The lanes of `lanes` that hit a triangle at all, and where.
+    #[inline(always)]
+    fn meet(&self, packet: &Packet<V>, slot: u32, lanes: u32, mut found: impl FnMut(&Candidate<V>, u32, u32)) {
+        let (numbers, prim) = self.triangle(slot);
+        Triangle::intersect(packet, &numbers, lanes, |candidate, lanes| found(candidate, lanes, prim));
+    }
+
+    /// The final hits of a group: what the common formula says of its winners.
+    #[inline(always)]
+    pub fn finish(&self, groups: &Groups, g: usize, packet: &Packet<V>, t_max: V) -> Final {
+        let slots = &groups.slot[g];
+        let none = V::splat(f32::from_bits(INVALID_ID));
+        let zero = V::constant(0.0);
+        let (mut t, mut u, mut v, mut prims) = (t_max, zero, zero, none);
+        let mut rest = !positions(slots, NO_SLOT) & V::ALL;
+        let mut denied = rest;
+        while rest != 0 {
+            let slot = slots[rest.trailing_zeros() as usize & 15];
+            let same = positions(slots, slot);
+            rest &= !same;
+            self.meet(packet, slot, same, |found, lanes, prim| {
+                let taken = found.hit & found.t.cmp_le(t_max) & Mask::from_bits(lanes);
+                t = select(taken, found.t, t);
+                u = select(taken, found.u, u);
+                v = select(taken, found.v, v);
+                // Numbers are moved as floats: selection copies bits.
+                prims = select(taken, V::splat(f32::from_bits(prim)), prims);
+                denied &= !taken.bits();
+            });
+        }
+        let mut hit = HitPacket::new(t);
+        (hit.u, hit.v) = (u, v);
+        hit.prim = bytemuck::cast(prims.to_array());
+        for lane in 0..V::N {
+            hit.inst[lane] = if hit.prim[lane] == INVALID_ID { INVALID_ID } else { 0 };
+        }
+        Final { hit, denied }
+    }
+}
+
+/// Decides by the common formula whether a triangle is hit by `lanes` of a group, and whether it is nearer than what
+/// they hit so far, by the tie rule if need be.
+#[cold]
+#[inline(never)]
+pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slot: u32, lanes: u32) {
+    let (packet, t_max, _) = Packet::<V>::load(exact.bundle.rays, exact.bundle.first + g * V::N);
+    let mut hits = 0;
+    let mut t = t_max;
+    exact.meet(&packet, slot, lanes, |found, lanes, _| {
+        let hit = (found.hit & found.t.cmp_le(t_max)).bits() & lanes;
+        t = select(Mask::from_bits(hit), found.t, t);
+        hits |= hit;
+    });
+    if ANY {
+        groups.done[g] |= hits;
+        let done = Mask::from_bits(hits);
+        groups.inv_lo[g] = select(done, V::splat(f32::INFINITY), groups.inv_lo[g]);
+        return;
+    }
+    if hits == 0 {
+        return;
+    }
+    let (_, prim) = exact.triangle(slot);
+    let mut wins = hits;
+    let mut rest = hits & !positions(&groups.slot[g], NO_SLOT);
+    while rest != 0 {
+        let old = groups.slot[g][rest.trailing_zeros() as usize & 15];
+        let same = rest & positions(&groups.slot[g], old);
+        rest &= !same;
+        exact.meet(&packet, old, same, |found, lanes, old_prim| {
+            let nearer = t.cmp_lt(found.t).bits();
+            let tie = if prim < old_prim { t.cmp_eq(found.t).bits() } else { 0 };
+            wins &= nearer | tie | !(lanes & found.hit.bits());
+        });
+    }
+    // From here on the depth is known as well as the common formula knows it.
+    let inverse = V::constant(1.0) / (t * groups.speed[g]);
+    let loose = groups.loose();
+    let mask = Mask::from_bits(wins);
+    groups.inv_lo[g] = select(mask, bounded(inverse) * V::splat(1.0 - loose), groups.inv_lo[g]);
+    groups.inv_hi[g] = select(mask, inverse * V::splat(1.0 + loose), groups.inv_hi[g]);
+    for lane in 0..V::N {
+        if wins >> lane & 1 != 0 {
+            groups.slot[g][lane] = slot;
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! The tile's own coordinates: seen from the common point, with the mean direction as depth axis.
+//!
+//! A ray becomes two numbers (s, t) = (d.u, d.v) / (d.a), a point P becomes (x, y, z) = (P.u, P.v, P.a), and the ray
+//! passes the point where x = s z and y = t z. Any three independent axes would do: rays and triangles go through
+//! the same map, so only the rounding of the map matters, not how perpendicular its axes are.
+
+use super::bundle::{Bundle, Shared};
+use super::{GROUPS, Mask, V, select};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot};
+use crate::math::Aabb;
+
+/// Scales of scenes the tile's arithmetic is made for: products of three coordinates, scaled, stay normal numbers.
+const EXPONENTS: std::ops::RangeInclusive<i32> = -60..=60;
+
+/// Axes u, v, a (scaled so that the scene is about unit size) around the common point.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Frame {
+    /// Origin of the frame, in the space of the geometry.
+    pub apex: [f32; 3],
+    /// Right, up, depth.
+    pub axes: [[f32; 3]; 3],
+    /// Power of two that the axes carry.
+    pub scale: f32,
+    /// Largest coordinate of the scene as seen from the apex, any axis, before scaling.
+    pub extent: f32,
+}
+
+impl Frame {
+    /// The frame of some groups of a bundle that looks at geometry within `bounds`; `None` if the scale is out of
+    /// range or the directions cancel.
+    #[inline(always)]
+    pub fn of(bundle: &Bundle, groups: u32, bounds: &Aabb<f32>) -> Option<Self> {
+        let apex = bundle.apex;
+        let reach = |a: usize| (bounds.lo[a] - apex[a]).abs().max((bounds.hi[a] - apex[a]).abs());
+        let extent = reach(0).max(reach(1)).max(reach(2));
+        let exponent = ((extent.to_bits() >> 23) as i32) - 127;
+        if !EXPONENTS.contains(&exponent) {
+            return None;
+        }
+        let scale = f32::from_bits(((127 - exponent) as u32) << 23);
+        let (sum, across) = Self::mean_direction(bundle, groups);
+        let a = normalised(sum)?;
+        let flat = |r: [f64; 3]| sub(r, a.map(|x| x * dot(r, a)));
+        // One direction, or directions on a line through the apex: any perpendicular axis does.
+        let u = normalised(flat(across)).or_else(|| {
+            let other = if a[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+            normalised(flat(other))
+        })?;
+        let v = [a[1] * u[2] - a[2] * u[1], a[2] * u[0] - a[0] * u[2], a[0] * u[1] - a[1] * u[0]];
+        let axes = [u, v, a].map(|axis| axis.map(|x| x as f32 * scale));
+        Some(Self { apex, axes, scale, extent })
+    }
+
+    /// Sum of unit directions of a sample of the rays, and the same with the left half of the picture negative.
+    /// The order of rays in a block (Morton) says what is left; where it is another order, nothing but the fit of
+    /// the rectangles gets worse.
+    #[inline(always)]
+    fn mean_direction(bundle: &Bundle, groups: u32) -> ([f64; 3], [f64; 3]) {
+        let mut sample: Lanes3<[f32; GROUPS]> = Default::default();
+        // One group alone is sampled whole, else each group by its first lane.
+        let single = groups.is_power_of_two().then(|| groups.trailing_zeros() as usize);
+        let mut used = 0;
+        for i in 0..GROUPS {
+            let (g, lane) = match single {
+                Some(g) => (g, i),
+                None => (i, (bundle.tame[i].trailing_zeros() as usize).min(V::N - 1)),
+            };
+            if groups >> g & 1 == 0 || bundle.tame[g] >> lane & 1 == 0 {
+                continue;
+            }
+            let ray = bundle.first + g * V::N + lane;
+            used |= 1 << i;
+            for axis in 0..3 {
+                sample[axis][i] = match bundle.shared {
+                    Shared::Start => bundle.rays.dir[axis][ray],
+                    Shared::End(_) => bundle.rays.org[axis][ray] - bundle.apex[axis],
+                };
+            }
+        }
+        let sample = sample.map(V::new);
+        let length = dot(sample, sample).sqrt();
+        let used = Mask::from_bits(used) & V::constant(0.0).cmp_lt(length);
+        let scale = select(used, V::constant(1.0) / length, V::constant(0.0));
+        // Number i of a block of 256 has its third and of a quarter its first bit of x at i & 4 and i & 1.
+        let quarter = groups & (groups - 1) != 0 && (0..4).any(|q| groups & !(0xf << (4 * q)) == 0);
+        let bit = if quarter { 1 } else { 4 };
+        let unit = sample.map(|x| select(used, x * scale, V::constant(0.0)).to_array());
+        let mut sums = ([0.0f64; 3], [0.0f64; 3]);
+        for axis in 0..3 {
+            for i in 0..GROUPS {
+                let x = f64::from(unit[axis][i]);
+                sums.0[axis] += x;
+                sums.1[axis] += if i & bit == 0 { -x } else { x };
+            }
+        }
+        sums
+    }
+
+    /// Vectors in this frame.
+    #[inline(always)]
+    pub fn coordinates(&self, d: Lanes3<V>) -> Lanes3<V> {
+        self.axes.map(|axis| dot(d, axis.map(V::splat)))
+    }
+}
+
+fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn normalised(v: [f64; 3]) -> Option<[f64; 3]> {
+    let length = dot(v, v).sqrt();
+    (length > 1e-6 && f64::MAX > length).then(|| v.map(|x| x / length))
+}

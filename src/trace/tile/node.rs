@@ -1,0 +1,162 @@
+//! One node against a tile: eight boxes against both edges of the tile's rectangle at once, then one box against
+//! the sixteen groups.
+//!
+//! For a plane through the apex with normal n, a box with centre c and half size h has n.c + |n|.h as largest
+//! value. The four families of planes (left, right, below, above) are evaluated at both edges of the tile; the
+//! largest value is a convex function of where the plane lies between them, so a straight line between the two
+//! values is a bound for every group. Source of the idea: Reshetov, Soupikov, Hurley, "Multi-level ray tracing
+//! algorithm", 2005 (frusta over boxes); the interpolation is our own.
+
+use super::groups::Groups;
+use super::{HALF_ULP, V};
+use crate::bvh::{Node, WIDTH};
+use crate::lanes::words::{signs, twice, upper_halves, without_key};
+use crate::lanes::{LaneMask, Lanes, f32x8};
+
+/// Half a vector: the eight children of a node.
+type Half = f32x8;
+
+/// Rounding errors of a box test, in half ulps of the scene's size times the plane's size; and how far a hit that
+/// the triangle test may accept can lie outside.
+pub const MARGIN: f32 = 48.0;
+
+/// What node tests need of a tile.
+#[derive(Clone, Copy, Debug)]
+pub struct Planes {
+    /// Per axis (s, t): half the plane normals' components, left edge in the low half, right edge in the high half.
+    normal: [[V; 3]; 2],
+    /// Their absolute values.
+    size: [[V; 3]; 2],
+    /// Margin by axis.
+    margin: [V; 2],
+    /// Half the depth axis, its absolute value, its margin.
+    depth: [f32; 3],
+    depth_size: [f32; 3],
+    depth_margin: f32,
+    apex: [f32; 3],
+}
+
+/// An opened node: children that are left to visit.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub struct Level {
+    /// Largest values of the left, right, lower and upper planes over each child's box: at the tile's low edge in
+    /// 0..8, at its high edge in 8..16.
+    edges: [[f32; 16]; 4],
+    /// Nearest depth of each child.
+    near: [f32; WIDTH],
+    /// Upper half of the nearest depth's bits, from 0 on; all ones for a child that is done or not wanted.
+    pub keys: [u16; WIDTH],
+    /// The node.
+    pub node: u32,
+    /// Groups that met it.
+    pub groups: u32,
+}
+
+impl Default for Level {
+    fn default() -> Self {
+        Self { edges: [[0.0; 16]; 4], near: [0.0; WIDTH], keys: [u16::MAX; WIDTH], node: 0, groups: 0 }
+    }
+}
+
+/// The key of a depth: order of keys is order of depths, coarsely.
+#[inline(always)]
+pub fn key(depth: f32) -> u16 {
+    ((if depth > 0.0 { depth } else { 0.0 }).to_bits() >> 16) as u16
+}
+
+impl Planes {
+    /// The planes of a loaded tile.
+    #[inline(always)]
+    pub fn of(groups: &Groups) -> Self {
+        let frame = &groups.frame;
+        let [u, v, a] = frame.axes;
+        let both = |lo: f32, hi: f32| twice_each(lo, hi);
+        let mut planes = Self {
+            normal: [[V::splat(0.0); 3]; 2],
+            size: [[V::splat(0.0); 3]; 2],
+            margin: [V::splat(0.0); 2],
+            depth: a.map(|x| 0.5 * x),
+            depth_size: a.map(|x| (0.5 * x).abs()),
+            depth_margin: 0.0,
+            apex: frame.apex,
+        };
+        let unit = MARGIN * HALF_ULP * frame.extent;
+        let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
+        for (axis, across) in [u, v].into_iter().enumerate() {
+            let normal = groups.bounds[axis].map(|edge| [0, 1, 2].map(|x| across[x] - edge * a[x]));
+            planes.normal[axis] = [0, 1, 2].map(|x| both(0.5 * normal[0][x], 0.5 * normal[1][x]));
+            planes.size[axis] = planes.normal[axis].map(V::abs);
+            // The tile's edges are rounded differences too: |edge| * |a| belongs to the plane's size.
+            let [lo, hi] = normal.map(|n| unit * (sum(n) + sum(across) + groups.wide * sum(a)));
+            planes.margin[axis] = both(lo, hi) + V::splat(groups.slack * (1.0 + groups.wide) * 2.0);
+        }
+        planes.depth_margin = unit * sum(a) + groups.slack * 2.0;
+        planes
+    }
+
+    /// Tests the children of `node`; fills in `level` if any is met.
+    #[inline(always)]
+    pub fn open(&self, node: &Node<f32>, level: &mut Level) -> bool {
+        let zero = Half::splat(0.0);
+        let (mut sum, mut size) = ([zero; 3], [zero; 3]);
+        for a in 0..3 {
+            let origin = Half::splat(self.apex[a]);
+            let lo = Half::new(node.bounds[a][0]) - origin;
+            let hi = Half::new(node.bounds[a][1]) - origin;
+            (sum[a], size[a]) = (hi + lo, hi - lo);
+        }
+        let (sums, sizes) = (sum.map(twice), size.map(twice));
+        let middle = |n: &[V; 3]| n[0].mul_add(sums[0], n[1].mul_add(sums[1], n[2] * sums[2]));
+        let radius = |n: &[V; 3], e: V| n[0].mul_add(sizes[0], n[1].mul_add(sizes[1], n[2].mul_add(sizes[2], e)));
+        let (ms, rs) = (middle(&self.normal[0]), radius(&self.size[0], self.margin[0]));
+        let (mt, rt) = (middle(&self.normal[1]), radius(&self.size[1], self.margin[1]));
+        let (left, right, below, above) = (rs + ms, rs - ms, rt + mt, rt - mt);
+        let d = self.depth.map(Half::splat);
+        let e = self.depth_size.map(Half::splat);
+        let mz = d[0].mul_add(sum[0], d[1].mul_add(sum[1], d[2] * sum[2]));
+        let margin = Half::splat(self.depth_margin);
+        let rz = e[0].mul_add(size[0], e[1].mul_add(size[1], e[2].mul_add(size[2], margin)));
+        // Left of the tile's left edge or right of its right edge, all of the box.
+        let outside = signs(left.fast_min(below)) & 0xff | signs(right.fast_min(above)) >> 8;
+        let in_front = zero.cmp_le(mz + rz).bits();
+        let met = !outside & in_front & ((1u32 << node.used.min(8)) - 1);
+        if met == 0 {
+            return false;
+        }
+        left.store(&mut level.edges[0]);
+        right.store(&mut level.edges[1]);
+        below.store(&mut level.edges[2]);
+        above.store(&mut level.edges[3]);
+        let near = mz - rz;
+        level.near = near.to_array();
+        level.keys = upper_halves(near.fast_max(zero), met);
+        true
+    }
+}
+
+impl Level {
+    /// Groups that meet the box of `child`, of those that met the node.
+    #[inline(always)]
+    pub fn groups_at(&self, child: usize, groups: &Groups) -> u32 {
+        let between = |family: usize, part: V| {
+            let (a, b) = (V::splat(self.edges[family][child]), V::splat(self.edges[family][child + 8]));
+            part.mul_add(b, a - part * a)
+        };
+        let [s, t] = &groups.part;
+        // The left planes lie at the groups' least s, the right planes at their greatest; so for t.
+        let least = between(0, s[0]).fast_min(between(1, s[1])).fast_min(between(2, t[0]).fast_min(between(3, t[1])));
+        let near = V::splat(self.near[child]).cmp_le(groups.far);
+        !signs(least) & near.bits() & self.groups
+    }
+
+    /// Takes a child off the list.
+    #[inline(always)]
+    pub fn remove(&mut self, child: usize) {
+        self.keys = without_key(&self.keys, child);
+    }
+}
+
+fn twice_each(lo: f32, hi: f32) -> V {
+    V::new(std::array::from_fn(|i| if i < 8 { lo } else { hi }))
+}

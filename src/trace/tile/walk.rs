@@ -1,0 +1,114 @@
+//! A tile's way through the tree: nearest child first, without sorting and without a stack of children. A level
+//! keeps the keys of the children not yet visited; it is left when the nearest of them lies behind everything.
+
+use super::exact::Exact;
+use super::node::{Level, Planes, key};
+use super::pairs::flush;
+use super::{GROUPS, Memory, V};
+use crate::bvh::{Child, Node};
+use crate::lanes::Lanes;
+use crate::lanes::words::least_key;
+use crate::ray::Counters;
+
+use super::batch::BATCH;
+
+/// Traces what is loaded in `memory` through the object.
+#[inline(always)]
+pub fn walk<const ANY: bool, const COUNT: bool>(
+    memory: &mut Memory,
+    exact: &Exact,
+    groups: u32,
+    counters: &mut Counters,
+) {
+    let tree = &exact.object.tree;
+    let Some(root) = tree.nodes.first() else { return };
+    memory.batch.clear();
+    memory.slabs.start();
+    let planes = Planes::of(&memory.groups);
+    let mut limit = limit(memory);
+    let mut depth = 0;
+    if !open::<COUNT>(&planes, root, 0, groups, &mut memory.levels[0], counters) {
+        return;
+    }
+    loop {
+        let level = &mut memory.levels[depth];
+        let (nearest, slot) = least_key(&level.keys);
+        if u32::from(nearest) >= limit {
+            if depth == 0 {
+                break;
+            }
+            depth -= 1;
+            continue;
+        }
+        level.remove(slot);
+        let mut met = level.groups_at(slot, &memory.groups);
+        let node = &tree.nodes[level.node as usize];
+        if met != 0 && memory.slabs.wanted::<ANY>(met) {
+            met = memory.slabs.test(&memory.groups, exact.bundle, &node.child_bounds(slot), met);
+        }
+        if met == 0 {
+            continue;
+        }
+        let child = node.child(slot);
+        if child.is_leaf() {
+            leaf::<ANY, COUNT>(memory, exact, child, met, counters);
+            limit = self::limit(memory);
+        } else {
+            let node = &tree.nodes[child.index as usize];
+            let below = &mut memory.levels[depth + 1];
+            if open::<COUNT>(&planes, node, child.index, met, below, counters) {
+                depth += 1;
+            }
+        }
+    }
+    if memory.batch.len() > 0 {
+        flush::<ANY, COUNT>(memory, exact, counters);
+    }
+}
+
+/// Children with keys from here on lie behind everything.
+#[inline(always)]
+fn limit(memory: &Memory) -> u32 {
+    let farthest = memory.groups.farthest;
+    if farthest == f32::NEG_INFINITY { 0 } else { (u32::from(key(farthest)) + 1).min(0xffff) }
+}
+
+#[inline(always)]
+fn open<const COUNT: bool>(
+    planes: &Planes,
+    node: &Node<f32>,
+    index: u32,
+    groups: u32,
+    level: &mut Level,
+    counters: &mut Counters,
+) -> bool {
+    if COUNT {
+        counters.nodes += 1;
+        counters.boxes += u64::from(node.used);
+        counters.node_lanes_active += u64::from(groups.count_ones()) * V::N as u64;
+        counters.node_lanes_total += (GROUPS * V::N) as u64;
+    }
+    let met = planes.open(node, level);
+    if met {
+        (level.node, level.groups) = (index, groups);
+    }
+    met
+}
+
+#[inline(always)]
+fn leaf<const ANY: bool, const COUNT: bool>(
+    memory: &mut Memory,
+    exact: &Exact,
+    child: Child,
+    groups: u32,
+    counters: &mut Counters,
+) {
+    let count = usize::from(child.count);
+    if COUNT {
+        counters.leaves += 1;
+    }
+    if memory.batch.len() + count > BATCH {
+        flush::<ANY, COUNT>(memory, exact, counters);
+    }
+    memory.batch.push(&exact.object.triangles[child.index as usize], child.index * 8, count, groups);
+}

@@ -1,0 +1,294 @@
+//! The tile engine against the scalar engine: same bits for rays with a common origin, a common end or neither.
+
+mod common;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use common::{Random, ball, soup};
+use glam::{DAffine3, DVec3};
+use lanecast::ray::{Counters, Hits, Rays};
+use lanecast::scene::description::{Description, ItemKind};
+use lanecast::scene::mesh::Mesh;
+use lanecast::scene::world::{Preset, World};
+use lanecast::scene::{ply, unpack};
+use lanecast::trace::{Engine, Scratch, engine};
+
+fn compile(meshes: Vec<Mesh>) -> World<f32> {
+    let mut d = Description::new("meshes");
+    for (i, mesh) in meshes.into_iter().enumerate() {
+        d.meshes.push(Arc::new(mesh));
+        d.groups[0].items.push(common::item(ItemKind::Mesh(i as u32), DAffine3::IDENTITY));
+    }
+    World::compile(&d, Preset::Balanced).unwrap()
+}
+
+fn find(name: &str) -> &'static dyn Engine<f32> {
+    engine::<f32>(name).unwrap()
+}
+
+/// How many answers differ from the scalar engine's, bit by bit: closest hits, any-hits.
+fn differences(world: &World<f32>, rays: &Rays<f32>) -> (usize, usize) {
+    let mut scratch = Scratch::default();
+    let (mut want, mut got) = (Hits::default(), Hits::default());
+    find("scalar").intersect(world, rays, &mut want, &mut scratch, None);
+    find("tile").intersect(world, rays, &mut got, &mut scratch, None);
+    let bits = |h: &Hits<f32>, i: usize| (h.t[i].to_bits(), h.u[i].to_bits(), h.v[i].to_bits(), h.prim[i], h.inst[i]);
+    let closest = (0..rays.len()).filter(|&i| bits(&want, i) != bits(&got, i)).count();
+    let (mut any_want, mut any) = (Vec::new(), Vec::new());
+    find("scalar").occluded(world, rays, &mut any_want, &mut scratch, None);
+    find("tile").occluded(world, rays, &mut any, &mut scratch, None);
+    let different = (0..rays.len()).filter(|&i| any_want[i] != any[i]).count();
+    (closest, different)
+}
+
+/// Morton order in squares of 32.
+fn pixel(i: usize, width: usize) -> (usize, usize) {
+    let even = |i: usize| (0..5).fold(0, |x, bit| x | (i >> (2 * bit) & 1) << bit);
+    let (tile, inside) = (i / 1024, i % 1024);
+    (tile % (width / 32) * 32 + even(inside), tile / (width / 32) * 32 + even(inside >> 1))
+}
+
+/// A picture of `n` x `n` rays from `eye` towards `target`.
+fn camera(eye: DVec3, target: DVec3, tan: f64, n: usize) -> Rays<f32> {
+    let forward = (target - eye).normalize();
+    let (right, up) = forward.any_orthonormal_pair();
+    let mut rays = Rays::new(n * n);
+    for i in 0..n * n {
+        let (x, y) = pixel(i, n);
+        let across = |p: usize| (p as f64 + 0.5) / n as f64 * 2.0 - 1.0;
+        let dir = forward + right * (tan * across(x)) + up * (tan * across(y));
+        rays.set(i, eye.as_vec3().to_array(), dir.as_vec3().to_array(), 0.0, f32::INFINITY);
+    }
+    rays
+}
+
+/// From the hits of `rays` to `light`, t = `end` at the light.
+fn shadows(world: &World<f32>, rays: &Rays<f32>, light: DVec3, end: f32, t_min: f32) -> Rays<f32> {
+    let (mut hits, mut scratch) = (Hits::default(), Scratch::default());
+    find("scalar").intersect(world, rays, &mut hits, &mut scratch, None);
+    let mut out = Rays::new(rays.len());
+    for i in (0..rays.len()).filter(|&i| hits.is_hit(i)) {
+        let at = |v: [f32; 3]| glam::Vec3::from_array(v);
+        let org = at(rays.org(i)) + at(rays.dir(i)) * hits.t[i];
+        let dir = (light - org.as_dvec3()) / f64::from(end);
+        out.set(i, org.to_array(), dir.as_vec3().to_array(), t_min, end);
+    }
+    out
+}
+
+fn worlds() -> Vec<(&'static str, World<f32>)> {
+    let mut r = Random(77);
+    let one = soup(2000, &mut r);
+    let mut shifted = ball(40, 60);
+    for p in &mut shifted.positions {
+        *p = *p * 0.01 + DVec3::new(1000.0, 2000.0, -500.0);
+    }
+    let mut grid = Mesh::default();
+    for i in 0..40u32 {
+        for j in 0..40u32 {
+            let at = |x: u32, y: u32| DVec3::new(f64::from(x) * 0.25 - 5.0, f64::from(y) * 0.25 - 5.0, 0.0);
+            let first = grid.positions.len() as u32;
+            grid.positions.extend([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+            grid.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        }
+    }
+    vec![
+        ("soup", compile(vec![one.clone()])),
+        ("every triangle twice", compile(vec![one.clone(), one])),
+        ("ball", compile(vec![ball(60, 80)])),
+        ("small ball far away", compile(vec![shifted])),
+        ("flat grid", compile(vec![grid])),
+    ]
+}
+
+#[test]
+fn pictures_and_shadows_are_those_of_the_scalar_engine() {
+    let mut r = Random(5);
+    for (name, world) in worlds() {
+        let (lo, hi) = world.bounds().unwrap();
+        let place = |f: DVec3| lo + (hi - lo) * f;
+        let mut traced = (0, 0);
+        for case in 0..24 {
+            let inside = case % 2 == 0;
+            let reach = if inside { 0.5 } else { 3.0 };
+            let eye = place(DVec3::splat(0.5) + r.in_cube() * reach);
+            let target = place(DVec3::splat(0.5) + r.in_cube() * 0.2);
+            let tan = [0.05, 0.5, 1.0, 30.0][case % 4];
+            let primary = camera(eye, target, tan, 64);
+            assert_eq!(differences(&world, &primary), (0, 0), "{name} case {case}");
+            let light = place(DVec3::splat(0.5) + r.in_cube() * reach * 1.5);
+            let (end, t_min) = [(1.0, 0.0), (1.0, 1e-4), (7.5, 0.0), (1.0 - 2e-6, 1e-6)][case / 2 % 4];
+            let shadow = shadows(&world, &primary, light, end, t_min);
+            assert_eq!(differences(&world, &shadow), (0, 0), "{name} shadows of case {case}");
+            traced = (traced.0 + primary.live_count(), traced.1 + shadow.live_count());
+        }
+        println!("{name}: {} primary rays and {} shadow rays, all bits equal", traced.0, traced.1);
+        assert!(traced.1 > 5000, "{name}");
+    }
+}
+
+#[test]
+fn rays_aimed_at_vertices_and_edges() {
+    let (mesh, mut r) = (ball(30, 40), Random(9));
+    let world = compile(vec![mesh.clone()]);
+    for eye in [DVec3::ZERO, DVec3::new(0.3, -0.2, 0.1), DVec3::new(2.0, 1.0, 0.5), DVec3::new(0.0, 0.0, 3.0)] {
+        let mut rays = Rays::new(4096);
+        for i in 0..rays.len() {
+            // Neighbours in the mesh are neighbours in the batch.
+            let corner = mesh.triangles[i / 2 % mesh.triangles.len()].map(|v| mesh.positions[v as usize]);
+            let target = if i % 2 == 0 { corner[0] } else { corner[0].lerp(corner[1], r.unit()) };
+            rays.set(i, eye.as_vec3().to_array(), (target - eye).as_vec3().to_array(), 0.0, f32::INFINITY);
+        }
+        assert_eq!(differences(&world, &rays), (0, 0), "from {eye}");
+    }
+}
+
+/// At a free edge no neighbour takes what a triangle leaves: here a wrong sign is a wrong answer.
+#[test]
+fn rays_aimed_at_free_edges() {
+    let mut r = Random(21);
+    let mesh = soup(400, &mut r);
+    let world = compile(vec![mesh.clone()]);
+    let mut doubtful = 0;
+    for triangle in &mesh.triangles {
+        let corner = triangle.map(|v| mesh.positions[v as usize]);
+        let away = corner[0] + r.in_cube() * [0.5, 3.0, 30.0][r.below(3)];
+        let (mut forth, mut back) = (Rays::new(256), Rays::new(256));
+        for i in 0..256 {
+            let target = corner[i % 3].lerp(corner[(i + 1) % 3], r.unit());
+            let (eye, way) = (away.as_vec3(), (target - away).as_vec3());
+            forth.set(i, eye.to_array(), way.to_array(), 0.0, f32::INFINITY);
+            // The same line from behind the triangle to a light in the same place.
+            let org = eye + way * 1.25;
+            back.set(i, org.to_array(), (eye - org).to_array(), 0.0, 1.0);
+        }
+        assert_eq!((differences(&world, &forth), differences(&world, &back)), ((0, 0), (0, 0)));
+        doubtful += 512;
+    }
+    println!("{doubtful} rays along free edges, all bits equal");
+}
+
+#[test]
+fn nothing_escapes_from_a_closed_ball() {
+    let world = compile(vec![ball(60, 80)]);
+    let (mut hits, mut scratch, mut r, mut rays_traced) = (Hits::default(), Scratch::default(), Random(3), 0);
+    while rays_traced < 1_000_000 {
+        let rays = camera(r.in_cube() * 0.5, r.in_cube() * 4.0, 0.05 + 2.0 * r.unit(), 128);
+        find("tile").intersect(&world, &rays, &mut hits, &mut scratch, None);
+        assert_eq!(hits.hit_count(), rays.len());
+        rays_traced += rays.len();
+    }
+}
+
+#[test]
+fn segments_and_dead_rays() {
+    let (world, mut r) = (compile(vec![ball(20, 30), soup(500, &mut Random(1))]), Random(2));
+    for len in [1, 15, 16, 17, 100, 255, 256, 257, 300, 1024] {
+        for _ in 0..20 {
+            let picture = camera(r.in_cube() * 5.0, r.in_cube(), 0.4, 32);
+            let mut rays = Rays::new(len);
+            for i in 0..len {
+                let (t_min, t_max) = match r.below(6) {
+                    0 => (r.unit(), 1.0),
+                    1 => (0.0, r.unit()),
+                    2 => (r.unit() * 2.0, f64::INFINITY),
+                    3 => (-1.0, 5.0),
+                    _ => (0.0, f64::INFINITY),
+                };
+                let dir = glam::Vec3::from_array(picture.dir(i)) * [1.0, 1e-3, 300.0][i % 3];
+                rays.set(i, picture.org(i), dir.to_array(), t_min as f32, t_max as f32);
+                match r.below(12) {
+                    0 => rays.kill(i),
+                    1 => rays.dir[1][i] = f32::NAN,
+                    2 => rays.t_max[i] = -1.0,
+                    3 => rays.dir[0][i] = 1e30,
+                    _ => {}
+                }
+            }
+            assert_eq!(differences(&world, &rays), (0, 0));
+        }
+    }
+}
+
+#[test]
+fn ends_exactly_at_a_hit() {
+    let (world, mut r) = (compile(vec![soup(800, &mut Random(4))]), Random(8));
+    let (mut hits, mut scratch) = (Hits::default(), Scratch::default());
+    for _ in 0..20 {
+        let mut rays = camera(r.in_cube() * 6.0, r.in_cube(), 0.3, 32);
+        find("scalar").intersect(&world, &rays, &mut hits, &mut scratch, None);
+        for i in 0..rays.len() {
+            let t = hits.t[i];
+            match i % 4 {
+                0 => rays.t_max[i] = t,
+                1 => rays.t_max[i] = t.next_down(),
+                2 if t.is_finite() => rays.t_min[i] = t,
+                3 if t.is_finite() => rays.t_min[i] = t.next_up(),
+                _ => {}
+            }
+        }
+        assert_eq!(differences(&world, &rays), (0, 0));
+    }
+}
+
+#[test]
+fn incoherent_rays_and_other_worlds_take_the_packet_path() {
+    for seed in 0..3 {
+        for world in [
+            World::compile(&common::zoo(seed, true), Preset::Balanced).unwrap(),
+            World::compile(&common::zoo(seed, false), Preset::Balanced).unwrap(),
+            compile(vec![soup(1000, &mut Random(seed))]),
+        ] {
+            assert_eq!(differences(&world, &common::rays(3000, seed)), (0, 0));
+            let eye = Random(seed).in_cube() * 6.0;
+            assert_eq!(differences(&world, &camera(eye, DVec3::ZERO, 0.6, 64)), (0, 0));
+        }
+    }
+    // One origin, every direction: nothing fits a frame.
+    let (world, mut r) = (compile(vec![soup(1000, &mut Random(6))]), Random(7));
+    let mut rays = Rays::new(2048);
+    for i in 0..rays.len() {
+        rays.set(i, [0.1, 0.2, 0.3], r.direction().as_vec3().to_array(), 0.0, f32::INFINITY);
+    }
+    assert_eq!(differences(&world, &rays), (0, 0));
+}
+
+#[test]
+fn counts_and_repeats() {
+    let world = compile(vec![ball(60, 80)]);
+    let rays = camera(DVec3::new(0.1, 0.2, 0.3), DVec3::X, 0.7, 64);
+    let (mut first, mut again, mut scratch) = (Hits::default(), Hits::default(), Scratch::default());
+    let mut counters = Counters::default();
+    find("tile").intersect(&world, &rays, &mut first, &mut scratch, Some(&mut counters));
+    find("tile").intersect(&world, &rays, &mut again, &mut scratch, None);
+    assert_eq!(first.t, again.t);
+    assert_eq!(counters.rays, rays.len() as u64);
+    // The point of tiles: far fewer node visits than rays.
+    assert!(counters.nodes * 4 < counters.rays, "{counters:?}");
+}
+
+#[test]
+fn hard_meshes() {
+    for name in ["needles", "duplicates_x64", "denormal", "huge_range", "flat_grid", "exponential", "teapot_in_stadium"]
+    {
+        let file = format!("../shared/scenes/pathological/{name}.ply");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+        let Ok(bytes) = unpack::read_file(&path) else {
+            println!("SKIPPED: {} is not there", path.display());
+            continue;
+        };
+        let world = compile(vec![ply::parse(&path, &bytes).unwrap()]);
+        let (lo, hi) = world.bounds().unwrap();
+        let mut r = Random(11);
+        for case in 0..8 {
+            let at = |f: DVec3| lo + (hi - lo) * f;
+            let eye = at(DVec3::splat(0.5) + r.in_cube() * if case % 2 == 0 { 0.5 } else { 2.0 });
+            let rays = camera(eye, at(DVec3::splat(0.5) + r.in_cube() * 0.1), 0.4, 64);
+            assert_eq!(differences(&world, &rays), (0, 0), "{name} case {case}");
+            let light = at(DVec3::splat(0.5) + r.in_cube());
+            let shadow = shadows(&world, &rays, light, 1.0, 0.0);
+            assert_eq!(differences(&world, &shadow), (0, 0), "{name} shadows of case {case}");
+        }
+    }
+}
