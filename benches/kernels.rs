@@ -79,7 +79,9 @@ impl Kernel for Triangles {
 
     #[inline(always)]
     fn test<V: Lanes>(data: &Self::Data<V::Scalar>, packet: &Packet<V>, hit: &mut HitPacket<V>) {
-        Triangle::intersect(packet, data, BLOCK, V::ALL, |found, lanes, prim| hit.commit(lanes, found, prim, 0));
+        Triangle::intersect(packet, data, (1 << BLOCK) - 1, V::ALL, |found, lanes, prim| {
+            hit.commit(lanes, found, prim, 0)
+        });
     }
 }
 

@@ -13,7 +13,7 @@ pub use super::interrupt::stop_flag;
 pub use super::output::OutputArgs;
 
 /// Engine of commands that are not told one.
-pub const DEFAULT_ENGINE: &str = "packet16";
+pub const DEFAULT_ENGINE: &str = "auto";
 
 /// Largest width or height of a picture.
 const MAX_SIDE: u32 = 1 << 16;

@@ -79,14 +79,14 @@ impl Triangle {
         Aabb { lo: [low(0), low(1), low(2)], hi: [high(0), high(1), high(2)] }
     }
 
-    /// Nearest hits of `N` rays on the first `count` triangles of a block. `found` gets, triangle by triangle, the
+    /// Nearest hits of `N` rays on some triangles of a block, the set bits of `slots`. `found` gets, triangle by triangle, the
     /// candidate (lanes where the line meets the triangle at `t_min <= t`; `u` and `v` are the weights of the second
     /// and third corner), the lanes it was tested for, and the primitive number.
     #[inline(always)]
     pub fn intersect<V: Lanes>(
         packet: &Packet<V>,
         block: &TriangleBlock<V::Scalar>,
-        count: usize,
+        slots: u32,
         active: u32,
         mut found: impl FnMut(&Candidate<V>, u32, u32),
     ) {
@@ -95,9 +95,9 @@ impl Triangle {
             let lanes = packet.dominant[axis] & active;
             if lanes != 0 {
                 match axis {
-                    0 => Self::along::<V, 0>(packet, block, count, lanes, &mut found),
-                    1 => Self::along::<V, 1>(packet, block, count, lanes, &mut found),
-                    _ => Self::along::<V, 2>(packet, block, count, lanes, &mut found),
+                    0 => Self::along::<V, 0>(packet, block, slots, lanes, &mut found),
+                    1 => Self::along::<V, 1>(packet, block, slots, lanes, &mut found),
+                    _ => Self::along::<V, 2>(packet, block, slots, lanes, &mut found),
                 }
             }
         }
@@ -108,11 +108,11 @@ impl Triangle {
     fn along<V: Lanes, const K: usize>(
         packet: &Packet<V>,
         block: &TriangleBlock<V::Scalar>,
-        count: usize,
+        slots: u32,
         lanes: u32,
         found: &mut impl FnMut(&Candidate<V>, u32, u32),
     ) {
-        let mut wanted = (1u32 << count) - 1;
+        let mut wanted = slots;
         if V::N == 1 {
             // A single ray tests the whole block at once and looks closer where it is not outside.
             let splat = |v: Lanes3<V>| v.map(|x| <V::Scalar as Real>::Octo::splat(x.lane(0)));
@@ -142,20 +142,21 @@ impl Triangle {
         let corner = [0, 1, 2].map(|a| V::splat(n[a]) - packet.org[a]);
         let t = dot(plane, corner) / dot(plane, packet.dir);
         let mut found = Candidate { hit: maybe, t, u: e.v * inv, v: e.w * inv };
+        let own = Self::bounds(n);
+        let interval = Interval::of(packet, own.lo, own.hi);
+        found.hit = maybe & interval.near.cmp_le(interval.far);
         let size = det.abs();
         let sound = V::constant(Self::least_det::<V::Scalar>()).cmp_le(size) & size.cmp_le(V::splat(V::Scalar::MAX));
-        let doubtful = (maybe & !sound).bits();
+        let doubtful = (found.hit & !sound).bits();
         if doubtful != 0 {
             found = Self::restart(packet, n, found, doubtful);
         }
-        let own = Self::bounds(n);
-        let interval = Interval::of(packet, own.lo, own.hi);
         let end = V::select(interval.far.cmp_eq(V::constant(0.0)) & Self::along_a_face(packet), found.t, interval.far);
         found.t = packet.t_floor.fast_max(interval.near.fast_max(found.t.fast_min(end)));
         // A parameter that overflowed is no hit: it would tie with the end of an infinite segment.
         let finite = found.t.abs().cmp_le(V::splat(V::Scalar::MAX));
-        let meets = interval.near.cmp_le(interval.far) & packet.t_min.cmp_le(interval.far);
-        found.hit = found.hit & meets & packet.t_min.cmp_le(found.t) & finite;
+        let in_front = packet.t_min.cmp_le(interval.far);
+        found.hit = found.hit & in_front & packet.t_min.cmp_le(found.t) & finite;
         found
     }
 

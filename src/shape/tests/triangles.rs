@@ -14,7 +14,9 @@ type Found = ([u64; 3], u32);
 fn traced<V: Lanes>(rays: &[Ray], block: &Block<V::Scalar, 9>, count: usize, active: u32, t_max: f64) -> Vec<Found> {
     let packet = packet::<V>(rays);
     let mut hits = HitPacket::new(V::constant(t_max));
-    Triangle::intersect(&packet, block, count, active, |found, lanes, prim| hits.commit(lanes, found, prim, 3));
+    Triangle::intersect(&packet, block, (1 << count) - 1, active, |found, lanes, prim| {
+        hits.commit(lanes, found, prim, 3)
+    });
     (0..V::N).map(|i| ([hits.t, hits.u, hits.v].map(|x| x.lane(i).to_f64().to_bits()), hits.prim[i])).collect()
 }
 

@@ -29,16 +29,15 @@ pub struct Final {
 }
 
 impl Exact<'_> {
-    fn triangle(&self, slot: u32) -> ([f32; 9], u32) {
-        let block = &self.object.triangles[(slot >> 3) as usize];
-        (block.get((slot & 7) as usize), block.prim[(slot & 7) as usize])
+    fn prim(&self, slot: u32) -> u32 {
+        self.object.triangles[(slot >> 3) as usize].prim[(slot & 7) as usize]
     }
 
     /// The lanes of `lanes` that hit a triangle at all, and where.
     #[inline(always)]
     fn meet(&self, packet: &Packet<V>, slot: u32, lanes: u32, mut found: impl FnMut(&Candidate<V>, u32, u32)) {
-        let (numbers, prim) = self.triangle(slot);
-        Triangle::intersect(packet, &numbers, lanes, |candidate, lanes| found(candidate, lanes, prim));
+        let block = &self.object.triangles[(slot >> 3) as usize];
+        Triangle::intersect(packet, block, 1 << (slot & 7), lanes, &mut found);
     }
 
     /// The final hits of a group: what the common formula says of its winners.
@@ -96,7 +95,7 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slo
     if hits == 0 {
         return;
     }
-    let (_, prim) = exact.triangle(slot);
+    let prim = exact.prim(slot);
     let mut wins = hits;
     let mut rest = hits & !positions(&groups.slot[g], NO_SLOT);
     while rest != 0 {
