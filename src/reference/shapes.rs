@@ -58,14 +58,12 @@ pub(super) fn is_proper(corners: [DVec3; 3]) -> bool {
 
 /// The line's crossing with the triangle's plane, whether it lies inside the triangle or not; `None` if parallel.
 ///
-/// Cramer's rule on `org - p0 = u e1 + v e2 - t dir` (Moeller, Trumbore, "Fast, minimum storage ray-triangle
-/// intersection", 1997), with t from the plane's normal.
+/// Cramer's rule (Moeller, Trumbore, "Fast, minimum storage ray-triangle intersection", 1997), t from the plane.
 pub(super) fn triangle_plane([p0, p1, p2]: [DVec3; 3], org: DVec3, dir: DVec3) -> Option<TriangleCrossing> {
     let (e1, e2, s) = (p1 - p0, p2 - p0, org - p0);
-    let ng = cross(e1, e2);
-    let det = -dir.dot(ng);
-    let hit =
-        TriangleCrossing { t: s.dot(ng) / det, u: dir.dot(cross(e2, s)) / det, v: dir.dot(cross(s, e1)) / det, ng };
+    let (ng, det) = (cross(e1, e2), -dir.dot(cross(e1, e2)));
+    let (u, v) = (dir.dot(cross(e2, s)) / det, dir.dot(cross(s, e1)) / det);
+    let hit = TriangleCrossing { t: s.dot(ng) / det, u, v, ng };
     (det.abs() > PARALLEL * dir.length() * ng.length()).then_some(hit)
 }
 
