@@ -237,7 +237,10 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
         world_to_camera: Some(camera.world_to_camera().transpose().to_cols_array_2d()),
         world_to_ndc: Some(camera.world_to_ndc().transpose().to_cols_array_2d()),
     };
-    write(&args.file, &output.film, &info, args.exposure)?;
+    // Without a finished tile there is nothing to show, and an older picture is worth more.
+    if output.tiles_done > 0 {
+        write(&args.file, &output.film, &info, args.exposure)?;
+    }
     let made = Made { engine: engine.name(), precision: S::PRECISION, build_seconds: world.stats().build_seconds };
     tell(args, &report(args, options, &output, &made), &output)?;
     if output.is_complete() { Ok(()) } else { Err(Error::Interrupted) }
@@ -284,7 +287,11 @@ fn report<'a>(args: &'a RenderArgs, options: &RenderOptions, output: &'a RenderO
 fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput) -> Result<()> {
     let (file, (width, height), rays) = (&report.file, report.size, &report.rays);
     let (done, total) = report.tiles;
-    let part = if report.complete { String::new() } else { format!(", only {done} of {total} tiles") };
+    let part = match (report.complete, done) {
+        (true, _) => String::new(),
+        (false, 0) => format!(", none of {total} tiles was finished, nothing is written"),
+        (false, _) => format!(", only {done} of {total} tiles"),
+    };
     args.output.say(&format!(
         "{file}: {width}x{height}{part}, {} rays in {:.3} s with {} ({:.1} Mrays/s, shading included)",
         rays.total, report.seconds, report.engine, report.mrays_per_s

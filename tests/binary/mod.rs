@@ -1,7 +1,9 @@
 //! Runs the real binary, and writes ray files byte by byte, apart from the library's own writer.
 #![allow(dead_code, reason = "each test file uses its own part of this module")]
 
-use std::path::Path;
+pub mod watch;
+
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// A binary call that ended.
@@ -36,6 +38,16 @@ pub fn refused(folder: &Path, arguments: &[&str], what: &str) {
     assert_eq!(ended.code, Some(2), "{arguments:?}: {}", ended.err);
     assert!(ended.err.starts_with("error: ") && ended.err.contains(what), "{arguments:?}: {}", ended.err);
     assert!(!ended.err.contains("panicked") && ended.out.is_empty(), "{arguments:?}: {}", ended.err);
+}
+
+/// A file or folder of the shared data beside the package, or a line that says it is not there.
+pub fn shared(path: &str) -> Option<PathBuf> {
+    let full = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(path);
+    if !full.exists() {
+        println!("SKIPPED: no ../shared/{path}");
+        return None;
+    }
+    Some(full)
 }
 
 /// Names of the files in `folder`, sorted.

@@ -120,7 +120,7 @@ impl Job<'_> {
             if self.tile::<ANY, COUNT>(object, bundle, all & quarter) {
                 continue;
             }
-            for g in (0..GROUPS).filter(|g| all & quarter >> g & 1 != 0) {
+            for g in (0..GROUPS).filter(|g| (all & quarter) >> g & 1 != 0) {
                 if !self.tile::<ANY, COUNT>(object, bundle, 1 << g) {
                     self.packet::<ANY, COUNT>(bundle.first + g * V::N);
                 }

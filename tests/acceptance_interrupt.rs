@@ -1,0 +1,83 @@
+//! A render that is stopped by Ctrl-C: exit code 130, a valid picture of the finished tiles, no temporary file.
+#![cfg(unix)]
+
+mod binary;
+
+use std::process::Command;
+use std::time::Duration;
+
+use binary::watch::Running;
+use binary::{Ended, files};
+use lanecast::film::{exr, png};
+
+const LIMIT: Duration = Duration::from_secs(50);
+
+fn interrupt(running: &Running) {
+    let sent = Command::new("kill").args(["-INT", &running.id().to_string()]).status().expect("kill");
+    assert!(sent.success());
+}
+
+/// A picture that takes minutes, stopped after `wait`: the files left, and stderr.
+fn stopped(target: &str, wait: Duration) -> (tempfile::TempDir, Vec<String>, String) {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let line = format!("render builtin:gallery -o {target} --size 640x640 --spp 20 --integrator ao --ao-samples 256");
+    let running = Running::start(dir.path(), &line.split(' ').collect::<Vec<_>>());
+    std::thread::sleep(wait);
+    interrupt(&running);
+    let watched = running.wait(LIMIT);
+    assert_eq!(watched.ended.code, Some(130), "{}", watched.ended.err);
+    assert!(!watched.ended.err.contains("panicked"), "{}", watched.ended.err);
+    let left = files(dir.path());
+    (dir, left, watched.ended.err)
+}
+
+#[test]
+fn what_was_finished_is_written() {
+    let (dir, left, said) = stopped("out.exr", Duration::from_secs(4));
+    assert_eq!(left, ["out.exr"], "{said}");
+    assert!(said.contains("only ") && said.contains(" tiles"), "{said}");
+    let film = exr::read(&dir.path().join("out.exr")).expect("a whole file");
+    assert_eq!((film.width, film.height), (640, 640));
+    let alpha = film.f32_plane("A").expect("A");
+    let done: u64 = said.split("only ").nth(1).and_then(|rest| rest.split(' ').next()?.parse().ok()).expect("a number");
+    assert!(done < 400, "{said}");
+    // Tiles are whole or empty: at most as many are seen as are said to be done.
+    let tile = |i: usize| i / 640 / 32 * 20 + i % 640 / 32;
+    let seen: std::collections::BTreeSet<_> =
+        alpha.iter().enumerate().filter(|(_, a)| **a != 0.0).map(|(i, _)| tile(i)).collect();
+    assert!(seen.len() as u64 <= done, "{} tiles show something, {said}", seen.len());
+}
+
+/// At any moment, also before the first tile or while the scene is built, nothing half-made is left.
+#[test]
+fn no_moment_leaves_a_broken_or_temporary_file() {
+    for milliseconds in [60, 150, 400, 1000] {
+        let (dir, left, said) = stopped("out.png", Duration::from_millis(milliseconds));
+        assert!(left.is_empty() || left == ["out.png"], "after {milliseconds} ms: {left:?}");
+        if !left.is_empty() {
+            let film = png::read(&dir.path().join("out.png")).expect("a whole file");
+            assert_eq!((film.width, film.height), (640, 640), "{said}");
+        }
+    }
+}
+
+/// One tile that takes minutes: nothing is finished, so nothing is written, and an older picture is kept.
+#[test]
+fn without_a_finished_tile_the_older_picture_is_kept() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let target = dir.path().join("out.png");
+    let line = "render builtin:gallery -o out.png --size 32x32 --spp 65536 --integrator ao --ao-samples 256";
+    for older in [None, Some(&b"an older picture"[..])] {
+        if let Some(bytes) = older {
+            std::fs::write(&target, bytes).expect("a file");
+        }
+        let running = Running::start(dir.path(), &line.split(' ').collect::<Vec<_>>());
+        std::thread::sleep(Duration::from_millis(2500));
+        interrupt(&running);
+        let Ended { code, err, .. } = running.wait(LIMIT).ended;
+        assert_eq!(code, Some(130), "{err}");
+        assert!(err.contains("none of 1 tiles was finished, nothing is written"), "{err}");
+        assert_eq!(std::fs::read(&target).ok().as_deref(), older, "{err}");
+        assert_eq!(files(dir.path()).len(), usize::from(older.is_some()));
+    }
+}
