@@ -61,11 +61,7 @@ fn scene<S: Engines>(criterion: &mut Criterion, scene: &Scene) {
     let view = View::new(&world, &scene.description, &|_| Ok(scene.camera.clone()), (SIZE, SIZE), 1).expect("a view");
     let mut scratch = Scratch::default();
     for kind in RayKind::ALL {
-        let rays = match kind {
-            RayKind::Primary => view.primary.clone(),
-            _ => view.starts.rays(kind, &view.setting),
-        };
-        let batches = convert::<S>(&rays);
+        let batches = convert::<S>(&view.rays(&world, kind));
         let id = format!("{}/{}/{}", S::PRECISION, scene.name, kind.name());
         let want = truth(&id, &world, &batches, kind.query());
         let live: usize = batches.iter().map(Rays::live_count).sum();
