@@ -8,6 +8,7 @@ mod brute;
 mod bundle;
 mod leaf;
 mod query;
+mod single;
 mod tile;
 mod traverse;
 

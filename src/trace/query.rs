@@ -1,5 +1,6 @@
 //! One packet's query on its way through the trees: best hits, finished lanes, the stack.
 
+use super::single::Waiting;
 use crate::bvh::Child;
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::{Candidate, Counters, HitPacket};
@@ -16,6 +17,8 @@ struct Entry {
 pub struct Stack<S> {
     entries: Vec<Entry>,
     near: Vec<S>,
+    /// What waits for a single ray.
+    pub waiting: Vec<Waiting<S>>,
 }
 
 impl<S: Real> Stack<S> {
@@ -23,6 +26,8 @@ impl<S: Real> Stack<S> {
     pub fn reserve(&mut self, bound: usize) {
         self.entries.clear();
         self.entries.reserve(bound);
+        self.waiting.clear();
+        self.waiting.reserve(bound);
         let needed = bound * MAX_LANES;
         if self.near.len() < needed {
             self.near.resize(needed, S::ZERO);

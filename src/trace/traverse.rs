@@ -1,5 +1,5 @@
 //! Depth-first traversal of the 8-wide tree by a packet: one node against `N` rays, near child first, lanes masked
-//! out as they fail; a lone lane finishes at width 1.
+//! out as they fail; a lone lane, and so every ray of a packet of width 1, goes by [`super::single`].
 //!
 //! Source: Wald, Slusallek, Benthin, Wagner, "Interactive Rendering with Coherent Ray Tracing", 2001; the switch to
 //! single rays after Benthin, Wald, Woop, Ernst, Mark, "Combining Single and Packet-Ray Tracing for Arbitrary Ray
@@ -8,6 +8,7 @@
 use super::bundle::Bundle;
 use super::leaf;
 use super::query::Query;
+use super::single;
 use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Packet;
@@ -15,7 +16,7 @@ use crate::ray::slab::Interval;
 use crate::scene::world::{Object, World};
 
 /// What the leaves of a tree hold.
-trait Leaves<V: Lanes, const ANY: bool, const COUNT: bool> {
+pub trait Leaves<V: Lanes, const ANY: bool, const COUNT: bool> {
     /// Visits a leaf with some lanes.
     fn visit(&self, packet: &Packet<V>, query: &mut Query<V, ANY, COUNT>, leaf: Child, lanes: u32);
 }
@@ -56,7 +57,7 @@ pub fn world<V: Lanes, const ANY: bool, const COUNT: bool>(
         object(&world.objects[world.instances[0].object as usize], 0, packet, query, lanes);
         return;
     }
-    tree(&world.top, packet, query, Child::ROOT, lanes, &TopLeaves(world));
+    tree(&world.top, packet, query, lanes, &TopLeaves(world));
     for &inst in &world.unbounded_instances {
         instance(world, inst, packet, query, lanes);
     }
@@ -84,16 +85,15 @@ fn object<V: Lanes, const ANY: bool, const COUNT: bool>(
     lanes: u32,
 ) {
     leaf::unbounded(object, inst, packet, query, lanes);
-    tree(&object.tree, packet, query, Child::ROOT, lanes, &ObjectLeaves { object, inst });
+    tree(&object.tree, packet, query, lanes, &ObjectLeaves { object, inst });
 }
 
-/// Traverses `tree` from `root` on.
+/// Traverses `tree`.
 #[inline(always)]
 fn tree<V, L, const ANY: bool, const COUNT: bool>(
     tree: &Tree<V::Scalar>,
     packet: &Packet<V>,
     query: &mut Query<V, ANY, COUNT>,
-    root: Child,
     lanes: u32,
     leaves: &L,
 ) where
@@ -103,18 +103,20 @@ fn tree<V, L, const ANY: bool, const COUNT: bool>(
     if tree.nodes.is_empty() {
         return;
     }
+    if lanes.is_power_of_two() {
+        lone(tree, packet, query, Child::ROOT, lanes, leaves);
+        return;
+    }
     let mut bundle = Bundle::of(packet, lanes, query.hit.t);
     let all = lanes;
     let base = query.stack.len();
-    query.stack.push(root, lanes, V::splat(V::Scalar::LOWEST));
+    query.stack.push(Child::ROOT, lanes, V::splat(V::Scalar::LOWEST));
     while let Some((mut child, waiting, near)) = query.stack.pop::<V>(base) {
         let mut lanes = query.wanted(waiting, near);
         // Down to a leaf, always into the nearest child.
         while lanes != 0 {
-            if V::N > 1 && lanes.is_power_of_two() {
-                let lane = lanes.trailing_zeros() as usize;
-                let ray = packet.single(lane);
-                query.with_single(lane, |query| single(tree, &ray, query, child, leaves));
+            if lanes.is_power_of_two() {
+                lone(tree, packet, query, child, lanes, leaves);
                 break;
             }
             if child.is_leaf() {
@@ -136,19 +138,22 @@ fn tree<V, L, const ANY: bool, const COUNT: bool>(
     }
 }
 
-/// The rest of a lone lane's way.
-#[inline(never)]
-fn single<S, L, const ANY: bool, const COUNT: bool>(
-    subtree: &Tree<S>,
-    ray: &Packet<S>,
-    query: &mut Query<S, ANY, COUNT>,
+/// The way of a lone lane from `root` on.
+#[inline(always)]
+fn lone<V, L, const ANY: bool, const COUNT: bool>(
+    tree: &Tree<V::Scalar>,
+    packet: &Packet<V>,
+    query: &mut Query<V, ANY, COUNT>,
     root: Child,
+    lanes: u32,
     leaves: &L,
 ) where
-    S: Real,
-    L: Leaves<S, ANY, COUNT>,
+    V: Lanes,
+    L: Leaves<V::Scalar, ANY, COUNT>,
 {
-    tree(subtree, ray, query, root, 1, leaves);
+    let lane = lanes.trailing_zeros() as usize;
+    let ray = packet.single(lane);
+    query.with_single(lane, |query| single::tree(tree, &ray, query, root, leaves));
 }
 
 /// Tests a node's children, puts all but the nearest on the stack, returns the nearest with its lanes.
@@ -160,44 +165,43 @@ fn children<V: Lanes, const ANY: bool, const COUNT: bool, const UNIFORM: bool>(
     bundle: &Bundle<V::Scalar>,
     lanes: u32,
 ) -> (Child, u32) {
-    // First the packet as a whole against all eight boxes; for a single ray that is the test itself.
+    // First the packet as a whole against all eight boxes. Where the first lane enters is near enough to go by.
     let mut keys = [V::Scalar::ZERO; WIDTH];
     let mut hit = if UNIFORM { bundle.children::<V>(node, &mut keys) } else { u32::MAX } & ((1 << node.used) - 1);
     let mut nears = [V::constant(0.0); WIDTH];
     let mut meets = [lanes; WIDTH];
     // Slots by distance, nearest last; any-hit keeps the node's own order (large children first), slot 0 last.
-    let mut order = [0usize; WIDTH];
+    let mut order = [0u8; WIDTH];
     let mut count = 0;
     while hit != 0 {
         let slot = if ANY { 31 - hit.leading_zeros() } else { hit.trailing_zeros() } as usize & (WIDTH - 1);
         hit &= !(1 << slot);
-        if V::N > 1 || !UNIFORM {
-            let interval = if UNIFORM { bundle.interval(packet, node, slot) } else { unordered(packet, node, slot) };
-            query.count_box();
-            meets[slot] &= interval.meets(packet.t_min, query.hit.t).bits();
-            if meets[slot] == 0 {
-                continue;
-            }
-            nears[slot] = interval.near;
+        let interval = if UNIFORM { bundle.interval(packet, node, slot) } else { unordered(packet, node, slot) };
+        query.count_box();
+        meets[slot] &= interval.meets(packet.t_min, query.hit.t).bits();
+        if meets[slot] == 0 {
+            continue;
+        }
+        nears[slot] = interval.near;
+        if !UNIFORM {
             keys[slot] = interval.near.lane(meets[slot].trailing_zeros() as usize);
-        } else {
-            nears[slot] = V::splat(keys[slot]);
         }
         let mut at = count;
-        while !ANY && at > 0 && keys[order[at - 1]] < keys[slot] {
+        while !ANY && at > 0 && keys[usize::from(order[at - 1])] < keys[slot] {
             order[at] = order[at - 1];
             at -= 1;
         }
-        order[at] = slot;
+        order[at] = slot as u8;
         count += 1;
     }
     if count == 0 {
         return (Child::ROOT, 0);
     }
     for &slot in &order[..count - 1] {
+        let slot = usize::from(slot);
         query.stack.push(node.child(slot), meets[slot], nears[slot]);
     }
-    let slot = order[count - 1];
+    let slot = usize::from(order[count - 1]);
     (node.child(slot), meets[slot])
 }
 
