@@ -8,12 +8,45 @@ use crate::measure::timing::MAX_THREADS;
 use crate::scene::description::{CameraDescription, Description, Precision};
 use crate::scene::load::{LoadOptions, load};
 use crate::scene::world::Preset;
+use crate::trace::{EXACT_ENGINE, Engine, Engines, engine as engine_called};
 
 pub use super::interrupt::stop_flag;
 pub use super::output::OutputArgs;
 
 /// Engine of commands that are not told one.
-pub const DEFAULT_ENGINE: &str = "auto";
+const DEFAULT_ENGINE: &str = "auto";
+
+/// Which engine traces.
+#[derive(Clone, Debug, clap::Args)]
+pub struct EngineArgs {
+    /// Engine
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_ENGINE)]
+    pub engine: String,
+    /// Only engines with the hits of `scalar`, bit for bit (`tile` has an arithmetic of its own)
+    #[arg(long)]
+    pub exact: bool,
+}
+
+impl Default for EngineArgs {
+    fn default() -> Self {
+        Self { engine: DEFAULT_ENGINE.into(), exact: false }
+    }
+}
+
+impl EngineArgs {
+    /// The engine asked for.
+    ///
+    /// # Errors
+    /// Unknown engines, and with `--exact` those that are not.
+    pub fn find<S: Engines>(&self) -> Result<&'static dyn Engine<S>> {
+        let engine = if self.exact && self.engine == DEFAULT_ENGINE { EXACT_ENGINE } else { &self.engine };
+        let engine = engine_called::<S>(engine)?;
+        if self.exact && !engine.is_exact() {
+            return Err(Error::Usage(format!("--exact: {} has an arithmetic of its own", engine.name())));
+        }
+        Ok(engine)
+    }
+}
 
 /// Largest width or height of a picture.
 const MAX_SIDE: u32 = 1 << 16;
