@@ -163,9 +163,10 @@ impl<S: Engines> Subject<'_, S> {
             let modes = (0..series.len()).filter(|&i| name(series[i].tracer) == name_of_peer);
             modes.min_by(|&a, &b| mid(&series[a]).total_cmp(&mid(&series[b])))
         };
-        let row = |engine, scene, peer, outcome| {
+        let row = |engine, scene, peer, agreement: &Agreement, outcome| {
+            let Agreement { ties, differences, .. } = *agreement;
             let (class, query, precision) = (kind.name(), kind.query().name(), S::PRECISION);
-            Row { scene, class, query, engine, precision, rays, peer, outcome }
+            Row { scene, class, query, engine, precision, rays, ties, differences, peer, outcome }
         };
         let mut rows = Vec::new();
         for Entry { tracer, place } in entries {
@@ -176,22 +177,21 @@ impl<S: Engines> Subject<'_, S> {
                     mode: peer.facts().mode,
                     description: peer.facts().description.clone(),
                     quoted: one.is_none_or(|(_, place)| fastest(peer.facts().name) == Some(place)),
-                    ties: place.as_ref().map_or(0, |(_, agreement)| agreement.ties),
-                    differences: place.as_ref().map_or(0, |(_, agreement)| agreement.differences),
                     lead: one.and_then(|(one, _)| paired_ratio_median(&one.seconds, best?)),
                 }),
             };
-            let outcome = match place {
-                Ok((place, _)) => self.outcome(&series[place], scalar, batches, kind),
-                Err(outcome) => Some(outcome),
+            let (agreement, outcome) = match place {
+                Ok((place, agreement)) => (agreement, self.outcome(&series[place], scalar, batches, kind)),
+                Err(outcome) => (Agreement::default(), Some(outcome)),
             };
-            rows.extend(outcome.map(|outcome| row(name(tracer), self.facts_of(tracer), peer, outcome)));
+            let row = |outcome| row(name(tracer), self.facts_of(tracer), peer, &agreement, outcome);
+            rows.extend(outcome.map(row));
         }
         for guest in &self.guests {
             if let Err(why) = &guest.modes {
                 let peer = PeerRow { quoted: true, ..Default::default() };
                 let scene = SceneFacts { build_seconds: 0.0, bytes: 0, ..self.facts.clone() };
-                rows.push(row(guest.name, scene, Some(peer), Outcome::Skipped(why.clone())));
+                rows.push(row(guest.name, scene, Some(peer), &Agreement::default(), Outcome::Skipped(why.clone())));
             }
         }
         rows
