@@ -1,10 +1,13 @@
 //! The walk over the nodes of a scene: groups, instances and cameras of the description.
 
+use std::collections::HashSet;
+
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-use super::json::Node;
+use super::instances::Instances;
+use super::json::{InstanceAttributes, Node};
 use super::primitive::Primitives;
-use super::{Document, instances, look};
+use super::{Document, look};
 use crate::error::Result;
 use crate::scene::assembly::{MAX_NESTING, MAX_PLACEMENTS};
 use crate::scene::description::{Description, Group, GroupId, Item, ItemKind};
@@ -26,6 +29,7 @@ pub fn place(document: &Document<'_>, roots: &[u32], description: &mut Descripti
         primitives: Primitives::new(document),
         mesh_groups: vec![None; document.root.meshes.len()],
         visited: vec![false; document.root.nodes.len()],
+        camera_names: HashSet::new(),
         placed: 0,
         singular: 0,
         description,
@@ -68,6 +72,7 @@ struct Walk<'w, 'a> {
     /// The group of each mesh that was met.
     mesh_groups: Vec<Option<GroupId>>,
     visited: Vec<bool>,
+    camera_names: HashSet<String>,
     placed: u64,
     /// Nodes and instances whose transform cannot be inverted.
     singular: u64,
@@ -89,8 +94,12 @@ impl Walk<'_, '_> {
             return Ok(None);
         }
         if let Some(camera) = node.camera {
-            let camera = look::camera(self.document, camera, index, &to_world)?;
-            self.description.cameras.extend(camera);
+            if let Some(mut camera) = look::camera(self.document, camera, index, &to_world)? {
+                if !self.camera_names.insert(camera.name.clone()) {
+                    camera.name = format!("{} (node {index})", camera.name);
+                }
+                self.description.cameras.push(camera);
+            }
         }
         if !node.children.is_empty() && frame.depth < MAX_DEPTH {
             let name = name(node.name.as_deref());
@@ -109,15 +118,9 @@ impl Walk<'_, '_> {
     }
 
     /// Places `group` as often as the attributes of EXT_mesh_gpu_instancing say.
-    fn instances(
-        &mut self,
-        frame: &Frame,
-        group: GroupId,
-        attributes: super::json::InstanceAttributes,
-        node: u32,
-    ) -> Result<()> {
+    fn instances(&mut self, frame: &Frame, group: GroupId, attributes: InstanceAttributes, node: u32) -> Result<()> {
         let path = format!("nodes[{node}].extensions.EXT_mesh_gpu_instancing.attributes");
-        let instances = instances::Instances::new(self.document, attributes, &path)?;
+        let instances = Instances::new(self.document, attributes, &path)?;
         self.document.spend((instances.count() as u64).saturating_mul(size_of::<Item>() as u64), &path)?;
         for i in 0..instances.count() {
             self.instance(frame, frame.in_group * instances.get(i), group, node)?;
