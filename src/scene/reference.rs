@@ -20,7 +20,7 @@ impl References<'_> {
     /// References that leave the folder (absolute, through `..`, or through a symbolic link) unless that is
     /// allowed, and files that do not exist.
     pub fn resolve(&self, written: &str) -> Result<PathBuf, String> {
-        let Some(folder) = self.folder else { return Err("this scene has no folder to find files in".into()) };
+        let Some(folder) = self.folder else { return Err("a scene without a folder refers to no files".into()) };
         let relative = Path::new(written);
         let inside = relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         let shown = || text::shown(written.as_bytes());

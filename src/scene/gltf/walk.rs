@@ -93,13 +93,13 @@ impl Walk<'_, '_> {
             self.singular += 1;
             return Ok(None);
         }
-        if let Some(camera) = node.camera {
-            if let Some(mut camera) = look::camera(self.document, camera, index, &to_world)? {
-                if !self.camera_names.insert(camera.name.clone()) {
-                    camera.name = format!("{} (node {index})", camera.name);
-                }
-                self.description.cameras.push(camera);
+        if let Some(camera) = node.camera
+            && let Some(mut camera) = look::camera(self.document, camera, index, &to_world)?
+        {
+            if !self.camera_names.insert(camera.name.clone()) {
+                camera.name = format!("{} (node {index})", camera.name);
             }
+            self.description.cameras.push(camera);
         }
         if !node.children.is_empty() && frame.depth < MAX_DEPTH {
             let name = name(node.name.as_deref());
