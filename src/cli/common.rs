@@ -54,7 +54,7 @@ const MAX_SIDE: u32 = 1 << 16;
 /// A scene and how to open it.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SceneArgs {
-    /// A scene file (.kdl), a mesh (.obj .ply .stl) or builtin:NAME
+    /// A scene file (.kdl .gltf .glb), a mesh (.obj .ply .stl) or builtin:NAME
     pub scene: String,
     #[command(flatten)]
     /// How to open it.
@@ -67,7 +67,7 @@ pub struct SceneOptions {
     /// Change a parameter of the scene file; may be given more than once
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting, help_heading = "Scene")]
     pub set: Vec<(String, String)>,
-    /// Let the scene file name meshes outside its own folder
+    /// Let the scene file name other files outside its own folder
     #[arg(long, help_heading = "Scene")]
     pub allow_outside: bool,
     /// Time the build may take: how good the tree gets
