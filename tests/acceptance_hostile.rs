@@ -111,6 +111,20 @@ fn obj_files() {
 }
 
 #[test]
+fn gltf_files() {
+    let document = |rest: &str| format!("{{\"asset\": {{\"version\": \"2.0\"}},\n {rest}}}").into_bytes();
+    let mesh = "\"nodes\": [{\"mesh\": 0}], \"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0}}]}], ";
+    let accessor = |rest: &str| document(&format!("{mesh}\"accessors\": [{{\"componentType\": 5126, {rest}}}]"));
+    render("cut.gltf", b"{\"asset\": ", Place::Line, "");
+    render("type.gltf", &document("\"nodes\": 3"), Place::Line, "expected a sequence");
+    render("zeros.gltf", &accessor("\"count\": 4000000000, \"type\": \"VEC3\""), Place::File, "decodes to more");
+    render("kind.gltf", &accessor("\"count\": 3, \"type\": \"VEC2\""), Place::File, "`VEC3`");
+    render("cycle.gltf", &document("\"nodes\": [{\"children\": [0]}]"), Place::File, "below itself");
+    render("lie.glb", b"glTF\x02\0\0\0\xff\xff\xff\xff", Place::Byte, "4294967295");
+    render("text.glb", b"{}", Place::Byte, "glTF");
+}
+
+#[test]
 fn stl_files() {
     let lie = [[0; 80].as_slice(), &[0xff; 4], &[0; 500]].concat();
     render("lie.stl", &lie, Place::Byte, "4294967295");

@@ -4,7 +4,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use lanecast::scene::{obj, ply, stl};
+use lanecast::scene::reference::References;
+use lanecast::scene::{gltf, obj, ply, stl};
 
 /// Tells the process to be the measuring one; its value is the file.
 const FILE: &str = "LANECAST_TEST_MEMORY_FILE";
@@ -27,6 +28,10 @@ fn measure(file: &Path) {
     let is_read = match file.extension().and_then(|e| e.to_str()) {
         Some("obj") => obj::parse(file, &bytes).map(drop),
         Some("ply") => ply::parse(file, &bytes).map(drop),
+        Some("gltf" | "glb") => {
+            let references = References { folder: None, allow_outside: false };
+            gltf::parse(file, "memory", &bytes, &references).map(drop)
+        }
         _ => stl::parse(file, &bytes).map(drop),
     };
     let after = both();
@@ -67,6 +72,29 @@ fn distinct_stl(size: usize) -> Vec<u8> {
         bytes.extend([0; 2]);
     }
     bytes
+}
+
+/// A glTF document with the members `head` and a list called `name` of about `size` bytes.
+fn gltf_list(size: usize, head: &str, name: &str, piece: &str) -> Vec<u8> {
+    let list = vec![piece; size / (piece.len() + 1)].join(",");
+    format!("{{\"asset\": {{\"version\": \"2.0\"}}, {head} \"{name}\": [{list}]}}").into_bytes()
+}
+
+/// A binary glTF file whose `size` bytes are the 8-bit indices of one strip.
+fn strip_glb(size: usize) -> Vec<u8> {
+    let size = size.next_multiple_of(4);
+    let mut json = format!(
+        "{{\"asset\": {{\"version\": \"2.0\"}}, \"nodes\": [{{\"mesh\": 0}}], \"meshes\": [{{\"primitives\": \
+         [{{\"attributes\": {{\"POSITION\": 0}}, \"indices\": 1, \"mode\": 5}}]}}], \"accessors\": [\
+         {{\"componentType\": 5126, \"count\": 256, \"type\": \"VEC3\"}}, \
+         {{\"bufferView\": 0, \"componentType\": 5121, \"count\": {size}, \"type\": \"SCALAR\"}}], \
+         \"bufferViews\": [{{\"buffer\": 0, \"byteLength\": {size}}}], \"buffers\": [{{\"byteLength\": {size}}}]}}"
+    );
+    json += &" ".repeat(json.len().next_multiple_of(4) - json.len());
+    let word = |n: usize| (n as u32).to_le_bytes();
+    let (whole, text) = (word(28 + json.len() + size), word(json.len()));
+    let head: [&[u8]; 6] = [b"glTF", &word(2), &whole, &text, b"JSON", json.as_bytes()];
+    [&head.concat()[..], &word(size), b"BIN\0", &vec![7; size]].concat()
 }
 
 #[test]
@@ -110,6 +138,13 @@ fn dense_files_stay_below_the_stated_bounds() {
         (40, "vertices.ply", ply_file("binary_little_endian", SIZE as u64 / 3, 0, &vec![1; SIZE / 3 * 3])),
         (40, "text.ply", ply_file("ascii", SIZE as u64 / 6, 0, "1 1 1 ".repeat(SIZE / 6).as_bytes())),
         (16, "distinct.stl", distinct_stl(SIZE)),
+        (64, "nodes.gltf", gltf_list(SIZE, "", "nodes", "{}")),
+        (64, "placed.gltf", gltf_list(SIZE, "\"meshes\": [{}],", "nodes", "{\"mesh\":0}")),
+        (64, "groups.gltf", gltf_list(SIZE, "", "nodes", "{\"children\":[]}")),
+        (64, "materials.gltf", gltf_list(SIZE, "", "materials", "{}")),
+        (64, "meshes.gltf", gltf_list(SIZE, "", "meshes", "{}")),
+        (64, "names.gltf", gltf_list(SIZE, "", "extensionsUsed", "\"a\"")),
+        (64, "strip.glb", strip_glb(SIZE)),
     ] {
         let (_, touched, is_read) = rise(name, &bytes);
         let times = touched as f64 / bytes.len() as f64;

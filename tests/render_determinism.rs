@@ -87,8 +87,8 @@ fn the_seed_changes_samples_but_not_single_sample_pictures() {
     assert!(picture(2, 1) != picture(2, 2));
 }
 
-/// Every generic engine, packets of all widths included, gives the picture of `scalar`. (`tile` and `auto` may compute
-/// in a frame of their own and are judged by `verify`.)
+/// Every generic engine, packets of all widths included, gives the picture of `scalar`. (`tile`, and so `auto`,
+/// computes in a frame of its own and is judged by `verify`.)
 fn engines_agree<S: Engines>() {
     let d = scene();
     let world = World::<S>::compile(&d, Preset::Balanced).unwrap();
@@ -99,7 +99,7 @@ fn engines_agree<S: Engines>() {
         bits(&render(&world, &d, &camera, &options, &Silent).unwrap())
     };
     let want = picture("scalar");
-    let names: Vec<&str> = S::engines().iter().map(|e| e.name()).filter(|n| !["tile", "auto"].contains(n)).collect();
+    let names: Vec<&str> = S::engines().iter().filter(|e| e.is_exact()).map(|e| e.name()).collect();
     assert!(names.len() >= 3, "{names:?}");
     for name in names {
         assert!(picture(name) == want, "{name}");

@@ -1,4 +1,5 @@
-//! The tile engine against the scalar engine: same bits for rays with a common origin, a common end or neither.
+//! The tile engines against the scalar engine, for rays with a common origin, a common end or neither: `tile-exact` has
+//! its bits; `tile`, which has an arithmetic of its own, has its answers but where the oracle's margins explain it.
 
 mod common;
 
@@ -7,8 +8,12 @@ use std::sync::Arc;
 
 use common::{Random, ball, soup};
 use glam::{DAffine3, DVec3};
+use lanecast::measure::agreement::compare;
+use lanecast::measure::answers::Answers;
+use lanecast::measure::truth;
 use lanecast::ray::{Counters, Hits, Rays};
-use lanecast::scene::description::{Description, ItemKind};
+use lanecast::reference::Oracle;
+use lanecast::scene::description::{Description, ItemKind, Precision};
 use lanecast::scene::mesh::Mesh;
 use lanecast::scene::world::{Preset, World};
 use lanecast::scene::{ply, unpack};
@@ -32,14 +37,31 @@ fn differences(world: &World<f32>, rays: &Rays<f32>) -> (usize, usize) {
     let mut scratch = Scratch::default();
     let (mut want, mut got) = (Hits::default(), Hits::default());
     find("scalar").intersect(world, rays, &mut want, &mut scratch, None);
-    find("tile").intersect(world, rays, &mut got, &mut scratch, None);
+    find("tile-exact").intersect(world, rays, &mut got, &mut scratch, None);
     let bits = |h: &Hits<f32>, i: usize| (h.t[i].to_bits(), h.u[i].to_bits(), h.v[i].to_bits(), h.prim[i], h.inst[i]);
     let closest = (0..rays.len()).filter(|&i| bits(&want, i) != bits(&got, i)).count();
     let (mut any_want, mut any) = (Vec::new(), Vec::new());
     find("scalar").occluded(world, rays, &mut any_want, &mut scratch, None);
-    find("tile").occluded(world, rays, &mut any, &mut scratch, None);
+    find("tile-exact").occluded(world, rays, &mut any, &mut scratch, None);
     let different = (0..rays.len()).filter(|&i| any_want[i] != any[i]).count();
+    find("tile").intersect(world, rays, &mut got, &mut scratch, None);
+    find("tile").occluded(world, rays, &mut any, &mut scratch, None);
+    explained(world, rays, &Answers::Closest(vec![want]), Answers::Closest(vec![got]));
+    explained(world, rays, &Answers::Any(vec![any_want]), Answers::Any(vec![any]));
     (closest, different)
+}
+
+/// Lets the oracle judge where `own` is not `scalar` up to rounding, and a sample of the rest.
+fn explained(world: &World<f32>, rays: &Rays<f32>, scalar: &Answers<f32>, own: Answers<f32>) {
+    let agreement = compare(scalar, &own);
+    let oracle = Oracle::new(&world.assembly);
+    let batches = std::slice::from_ref(rays);
+    for counts in [
+        truth::judge_unlike(&oracle, Precision::F32, batches, &own, &agreement),
+        truth::judge_own(&oracle, Precision::F32, batches, &own, 199),
+    ] {
+        assert_eq!(counts.unexplained, 0, "{:?}", counts.samples);
+    }
 }
 
 /// Morton order in squares of 32.

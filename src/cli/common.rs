@@ -8,12 +8,45 @@ use crate::measure::timing::MAX_THREADS;
 use crate::scene::description::{CameraDescription, Description, Precision};
 use crate::scene::load::{LoadOptions, load};
 use crate::scene::world::Preset;
+use crate::trace::{EXACT_ENGINE, Engine, Engines, engine as engine_called};
 
 pub use super::interrupt::stop_flag;
 pub use super::output::OutputArgs;
 
 /// Engine of commands that are not told one.
-pub const DEFAULT_ENGINE: &str = "auto";
+const DEFAULT_ENGINE: &str = "auto";
+
+/// Which engine traces.
+#[derive(Clone, Debug, clap::Args)]
+pub struct EngineArgs {
+    /// Engine
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_ENGINE)]
+    pub engine: String,
+    /// Only engines with the hits of `scalar`, bit for bit (`tile` has an arithmetic of its own)
+    #[arg(long)]
+    pub exact: bool,
+}
+
+impl Default for EngineArgs {
+    fn default() -> Self {
+        Self { engine: DEFAULT_ENGINE.into(), exact: false }
+    }
+}
+
+impl EngineArgs {
+    /// The engine asked for.
+    ///
+    /// # Errors
+    /// Unknown engines, and with `--exact` those that are not.
+    pub fn find<S: Engines>(&self) -> Result<&'static dyn Engine<S>> {
+        let engine = if self.exact && self.engine == DEFAULT_ENGINE { EXACT_ENGINE } else { &self.engine };
+        let engine = engine_called::<S>(engine)?;
+        if self.exact && !engine.is_exact() {
+            return Err(Error::Usage(format!("--exact: {} has an arithmetic of its own", engine.name())));
+        }
+        Ok(engine)
+    }
+}
 
 /// Largest width or height of a picture.
 const MAX_SIDE: u32 = 1 << 16;
@@ -21,7 +54,7 @@ const MAX_SIDE: u32 = 1 << 16;
 /// A scene and how to open it.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SceneArgs {
-    /// A scene file (.kdl), a mesh (.obj .ply .stl) or builtin:NAME
+    /// A scene file (.kdl .gltf .glb), a mesh (.obj .ply .stl) or builtin:NAME
     pub scene: String,
     #[command(flatten)]
     /// How to open it.
@@ -34,7 +67,7 @@ pub struct SceneOptions {
     /// Change a parameter of the scene file; may be given more than once
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting, help_heading = "Scene")]
     pub set: Vec<(String, String)>,
-    /// Let the scene file name meshes outside its own folder
+    /// Let the scene file name other files outside its own folder
     #[arg(long, help_heading = "Scene")]
     pub allow_outside: bool,
     /// Time the build may take: how good the tree gets

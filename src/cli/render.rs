@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use indicatif::ProgressBar;
 use serde::Serialize;
 
-use super::common::{CameraArgs, DEFAULT_ENGINE, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
+use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
 use super::output::json_to_stdout;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
@@ -18,7 +18,7 @@ use crate::render::{Aov, Progress, RenderOptions, RenderOutput, render};
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
 use crate::shade::Integrator;
-use crate::trace::{Engines, engine};
+use crate::trace::Engines;
 
 /// Picture size unless `--size` says otherwise.
 const DEFAULT_SIZE: (u32, u32) = (960, 540);
@@ -72,9 +72,8 @@ pub struct RenderArgs {
     /// Brightness of PNG files: colours times 2^STOPS
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     exposure: f32,
-    /// Engine
-    #[arg(long, value_name = "NAME", default_value = DEFAULT_ENGINE)]
-    engine: String,
+    #[command(flatten)]
+    engine: EngineArgs,
     /// Tile edge: 8, 16 or 32 pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 32)]
     tile: u32,
@@ -163,7 +162,7 @@ impl RenderArgs {
             ao_radius: 0.2,
             aov: "all".into(),
             exposure: 0.0,
-            engine: DEFAULT_ENGINE.into(),
+            engine: EngineArgs::default(),
             tile: 32,
             threads,
             output: OutputArgs::default(),
@@ -198,7 +197,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         spp: args.spp,
         seed: args.seed,
         integrator: args.integrator,
-        engine: args.engine.clone(),
+        engine: args.engine.engine.clone(),
         tile: args.tile,
         depth: args.depth,
         ao_samples: args.ao_samples,
@@ -214,7 +213,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
 }
 
 fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
-    let engine = engine::<S>(&options.engine)?;
+    let engine = args.engine.find::<S>()?;
     let world = World::<S>::compile(description, args.scene.options.preset())?;
     let (width, height) = (options.width, options.height);
     let camera = args.camera.choose(description, world.bounds(), (width, height))?;

@@ -25,6 +25,28 @@ pub fn positions(list: &[u32; 16], wanted: u32) -> u32 {
     u32x16::new(*list).simd_eq(u32x16::splat(wanted)).to_bitmask()
 }
 
+/// Positions that hold more than `number`, as bits.
+#[inline(always)]
+pub fn below(number: u32, list: &[u32; 16]) -> u32 {
+    u32x16::splat(number).simd_lt(u32x16::new(*list)).to_bitmask()
+}
+
+/// Asks the memory for element `i` of a list, which is wanted soon. Changes nothing but the time that takes.
+#[inline(always)]
+pub fn prefetch<T>(list: &[T], i: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(element) = list.get(i) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let first = (&raw const *element).cast::<i8>();
+        for line in (0..size_of::<T>()).step_by(64) {
+            // SAFETY: the address lies within `element`; a prefetch reads nothing the program can see.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(line)) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (list, i);
+}
+
 /// The least of eight keys and its first position.
 #[inline(always)]
 pub fn least_key(keys: &[u16; 8]) -> (u16, usize) {

@@ -1,9 +1,9 @@
 //! The bench: engines and peers x ray classes of a scene, checked before the clock starts, then timed interleaved.
 
 use crate::error::{Error, Result};
+use crate::measure::agreement::{Agreement, compare};
 use crate::measure::answers::Answers;
 use crate::measure::eye::{Framing, View};
-use crate::measure::peers::check::{Agreement, compare};
 use crate::measure::peers::{Guest, Invitation, Peer};
 use crate::measure::raysets::{RayKind, convert};
 use crate::measure::rows::{Outcome, PeerRow, Row, SceneFacts};
@@ -50,9 +50,9 @@ pub struct Plan {
 
 /// Measures one scene; every finished row goes to `report`, class by class.
 ///
-/// An engine whose answers differ from the `scalar` engine's in one bit gets an [`Outcome::Wrong`] row and no figure;
-/// if the oracle rejects the `scalar` engine's answers, so does every engine. Peers may differ as
-/// [`crate::measure::peers::check`] says; one that is missing gets an [`Outcome::Skipped`] row per class.
+/// An engine whose answers differ from the `scalar` engine's in one bit gets an [`Outcome::Wrong`] row and no figure (one
+/// with an arithmetic of its own: if the oracle cannot explain a difference); if the oracle rejects the `scalar` engine's answers, so does every engine. Peers may differ as
+/// [`crate::measure::agreement`] says; one that is missing gets an [`Outcome::Skipped`] row per class.
 ///
 /// # Errors
 /// Unknown engines or peers, those of compiling the world and making the rays; [`Error::Interrupted`] when `stop` says so.
@@ -163,9 +163,10 @@ impl<S: Engines> Subject<'_, S> {
             let modes = (0..series.len()).filter(|&i| name(series[i].tracer) == name_of_peer);
             modes.min_by(|&a, &b| mid(&series[a]).total_cmp(&mid(&series[b])))
         };
-        let row = |engine, scene, peer, outcome| {
+        let row = |engine, scene, peer, agreement: &Agreement, outcome| {
+            let Agreement { ties, differences, .. } = *agreement;
             let (class, query, precision) = (kind.name(), kind.query().name(), S::PRECISION);
-            Row { scene, class, query, engine, precision, rays, peer, outcome }
+            Row { scene, class, query, engine, precision, rays, ties, differences, peer, outcome }
         };
         let mut rows = Vec::new();
         for Entry { tracer, place } in entries {
@@ -176,22 +177,21 @@ impl<S: Engines> Subject<'_, S> {
                     mode: peer.facts().mode,
                     description: peer.facts().description.clone(),
                     quoted: one.is_none_or(|(_, place)| fastest(peer.facts().name) == Some(place)),
-                    ties: place.as_ref().map_or(0, |(_, agreement)| agreement.ties),
-                    differences: place.as_ref().map_or(0, |(_, agreement)| agreement.differences),
                     lead: one.and_then(|(one, _)| paired_ratio_median(&one.seconds, best?)),
                 }),
             };
-            let outcome = match place {
-                Ok((place, _)) => self.outcome(&series[place], scalar, batches, kind),
-                Err(outcome) => Some(outcome),
+            let (agreement, outcome) = match place {
+                Ok((place, agreement)) => (agreement, self.outcome(&series[place], scalar, batches, kind)),
+                Err(outcome) => (Agreement::default(), Some(outcome)),
             };
-            rows.extend(outcome.map(|outcome| row(name(tracer), self.facts_of(tracer), peer, outcome)));
+            let row = |outcome| row(name(tracer), self.facts_of(tracer), peer, &agreement, outcome);
+            rows.extend(outcome.map(row));
         }
         for guest in &self.guests {
             if let Err(why) = &guest.modes {
                 let peer = PeerRow { quoted: true, ..Default::default() };
                 let scene = SceneFacts { build_seconds: 0.0, bytes: 0, ..self.facts.clone() };
-                rows.push(row(guest.name, scene, Some(peer), Outcome::Skipped(why.clone())));
+                rows.push(row(guest.name, scene, Some(peer), &Agreement::default(), Outcome::Skipped(why.clone())));
             }
         }
         rows
@@ -228,8 +228,7 @@ impl<S: Engines> Subject<'_, S> {
         let cost = self.world.assembly.instanced_prims().clamp(1, 100_000);
         let sample = (ORACLE_LIMIT / cost).clamp(1, ORACLE_RAYS);
         let stride = rays.div_ceil(sample).max(1) as usize;
-        let precision = if S::PRECISION == "f64" { Precision::F64 } else { Precision::F32 };
-        let counts = self.workers.install(|| truth::judge(self.oracle, precision, batches, scalar, stride));
+        let counts = self.workers.install(|| truth::judge(self.oracle, precision::<S>(), batches, scalar, stride));
         let total = counts.total();
         let first = counts.samples.first()?;
         Some(format!("the oracle rejects {} of {total} sampled rays, {first}", counts.unexplained))
@@ -253,9 +252,23 @@ impl<S: Engines> Subject<'_, S> {
         }
         let mut answers = scalar.clone();
         self.workers.pass(engine, self.world, batches, &mut answers);
+        if !engine.is_exact() {
+            return self.admit_unlike(batches, scalar, answers);
+        }
         match answers.difference(scalar) {
             None => Ok((answers, Agreement::default())),
             Some(d) => Err(Outcome::Wrong(format!("{} rays differ from scalar, ray {}: {}", d.count, d.first, d.text))),
+        }
+    }
+
+    /// Answers of an arithmetic of its own: the oracle must explain each that is not `scalar`'s up to rounding.
+    fn admit_unlike(&self, batches: &[Rays<S>], scalar: &Answers<S>, answers: Answers<S>) -> Admission<S> {
+        let agreement = compare(scalar, &answers);
+        let judge = || truth::judge_unlike(self.oracle, precision::<S>(), batches, &answers, &agreement);
+        let counts = self.workers.install(judge);
+        match counts.samples.first() {
+            None => Ok((answers, agreement)),
+            Some(first) => Err(Outcome::Wrong(format!("the oracle rejects {} answers, {first}", counts.unexplained))),
         }
     }
 
@@ -282,6 +295,11 @@ impl<S: Engines> Subject<'_, S> {
             prim_lane_use: lane_use(counters.prim_lanes_active, counters.prim_lanes_total),
         })
     }
+}
+
+/// The oracle's name for precision `S`.
+pub fn precision<S: Engines>() -> Precision {
+    if S::PRECISION == "f64" { Precision::F64 } else { Precision::F32 }
 }
 
 /// One tracer's place among the series with how its answers compare, or why it has none.

@@ -1,5 +1,6 @@
 //! Measuring: ray sets, timing, statistics, checks before the clock starts, verification against the oracle, rows.
 
+pub mod agreement;
 pub mod answers;
 pub mod bench;
 pub mod env;

@@ -88,10 +88,6 @@ pub struct PeerRow {
     pub description: String,
     /// The fastest mode of this peer in this class: the one to compare with.
     pub quoted: bool,
-    /// Rays with our t and another primitive: shared edges, coincident surfaces.
-    pub ties: u64,
-    /// Rays with another answer (few, or there would be no figure).
-    pub differences: u64,
     /// Times as fast as this peer our fastest engine is, pass by pass.
     pub lead: Option<f64>,
 }
@@ -111,6 +107,10 @@ pub struct Row {
     pub precision: &'static str,
     /// Rays in the set, dead ones included.
     pub rays: u64,
+    /// Rays with `scalar`'s t and another primitive: shared edges, coincident surfaces.
+    pub ties: u64,
+    /// Rays with another answer than `scalar`'s (few, or there would be no figure).
+    pub differences: u64,
     /// What only peers have.
     pub peer: Option<PeerRow>,
     /// The rest.
@@ -158,12 +158,12 @@ fn line(run: &Run, row: &Row) -> String {
         Outcome::Wrong(why) => cells.extend(without_figures(format!("wrong: {why}"))),
     }
     cells.extend([format!("{:.6}", scene.build_seconds), scene.bytes.to_string()]);
-    cells.extend(row.peer.as_ref().map_or_else(Default::default, |peer| {
-        let counts = [peer.ties, peer.differences].map(|n| n.to_string());
-        let [ties, differences] = counts;
-        let mode = peer.mode.to_string();
-        [mode, peer.description.clone(), peer.quoted.to_string(), ties, differences, optional(&peer.lead)]
+    let peer = row.peer.as_ref();
+    cells.extend(peer.map_or_else(Default::default, |peer| {
+        [peer.mode.to_string(), peer.description.clone(), peer.quoted.to_string()]
     }));
+    cells.extend([row.ties, row.differences].map(|n| n.to_string()));
+    cells.push(peer.map_or(String::new(), |peer| optional(&peer.lead)));
     cells.push(run.command.clone());
     cells.iter().map(|c| quoted(c)).collect::<Vec<_>>().join(",")
 }
@@ -192,7 +192,7 @@ pub fn table(rows: &[Row]) -> String {
         let what = format!("{:<8} {:<7} {:<width$} {}", row.class, row.query, label(row), row.precision);
         let figures = match &row.outcome {
             Outcome::Timed { seconds, hits, ratio, node_lane_use, prim_lane_use, .. } => format!(
-                "{:>9.2} {:>9.2} {:>6.1}% {:>8} {:>7} {:>7} {:>10}{}",
+                "{:>9.2} {:>9.2} {:>6.1}% {:>8} {:>7} {:>7} {:>10} {:>9} {:>7} {:>6}",
                 row.mrays(seconds.median),
                 row.mrays(seconds.min),
                 100.0 * seconds.spread,
@@ -200,7 +200,9 @@ pub fn table(rows: &[Row]) -> String {
                 percent(*node_lane_use),
                 percent(*prim_lane_use),
                 hits,
-                row.peer.as_ref().map_or(String::new(), beside),
+                row.peer.as_ref().map_or("".into(), |peer| times(peer.lead)),
+                row.ties,
+                row.differences,
             ),
             Outcome::Skipped(why) => format!("  skipped: {why}"),
             Outcome::Wrong(why) => format!("  WRONG: {why}"),
@@ -215,11 +217,6 @@ fn label(row: &Row) -> String {
         Some(peer) if !peer.mode.is_empty() => format!("{} [{}]", row.engine, peer.mode),
         _ => row.engine.into(),
     }
-}
-
-/// The columns that only peers have.
-fn beside(peer: &PeerRow) -> String {
-    format!(" {:>9} {:>7} {:>6}", times(peer.lead), peer.ties, peer.differences)
 }
 
 fn heading(scene: &SceneFacts, width: usize) -> String {
@@ -259,7 +256,7 @@ fn percent(use_of_lanes: Option<f64>) -> String {
 pub const LEGEND: &str = "median, best: million rays per second; spread: (slowest - fastest) / median pass;\n\
     scalar: times as fast as the scalar engine, pass by pass; node, prim: lanes used in node and primitive tests;\n\
     ours/peer: times as fast as the peer (in its fastest mode) our fastest engine is, pass by pass;\n\
-    ties: rays with our distance and another primitive; differ: rays with another answer.\n";
+    ties: rays with scalar's distance and another primitive; differ: rays with another answer than scalar's.\n";
 
 #[cfg(test)]
 mod tests {
@@ -276,6 +273,8 @@ mod tests {
             engine: "packet4",
             precision: "f32",
             rays: 2_000_000,
+            ties: 5,
+            differences: 1,
             peer: None,
             outcome,
         }
@@ -350,7 +349,7 @@ mod tests {
     }
 
     fn peer(mode: &'static str, quoted: bool) -> Row {
-        let peer = PeerRow { mode, quoted, ties: 5, differences: 1, lead: Some(1.5), ..Default::default() };
+        let peer = PeerRow { mode, quoted, lead: Some(1.5), ..Default::default() };
         Row { engine: "embree", peer: Some(peer), ..timed() }
     }
 

@@ -6,9 +6,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::lanes::Real;
+use crate::measure::agreement::Agreement;
 use crate::measure::answers::Answers;
 use crate::ray::{Hits, Rays};
-use crate::reference::{EngineHit, Oracle, OracleRay, Tally, Verdict, Why};
+use crate::reference::{EngineHit, MARGIN_FACTOR, Oracle, OracleRay, Tally, Verdict, Why};
 use crate::scene::description::Precision;
 
 /// A [`Tally`] in words, for tables and JSON.
@@ -44,6 +45,10 @@ impl Counts {
     }
 }
 
+/// Margin factor (see [`crate::reference`]) for engines with an arithmetic of their own: three times the common one. Their rays
+/// and corners go through a rotation each, and edges are met a little outside so that nothing passes between them.
+pub const OWN_MARGIN_FACTOR: f64 = 3.0 * MARGIN_FACTOR;
+
 /// Judges every `stride`-th ray of `batches`, on the current rayon pool. Dead rays are judged too: their answer must
 /// be a miss.
 pub fn judge<S: Real>(
@@ -53,18 +58,57 @@ pub fn judge<S: Real>(
     answers: &Answers<S>,
     stride: usize,
 ) -> Counts {
-    let places = batches.iter().enumerate().flat_map(|(b, rays)| (0..rays.len()).map(move |i| (b, i)));
-    let chosen: Vec<(usize, (usize, usize))> = places.enumerate().step_by(stride.max(1)).collect();
+    let chosen = places(batches).enumerate().step_by(stride.max(1)).collect();
+    judge_these(oracle, (precision, MARGIN_FACTOR), batches, answers, chosen)
+}
+
+/// [`judge`] for an engine with an arithmetic of its own.
+pub fn judge_own<S: Real>(
+    oracle: &Oracle,
+    precision: Precision,
+    batches: &[Rays<S>],
+    answers: &Answers<S>,
+    stride: usize,
+) -> Counts {
+    let chosen = places(batches).enumerate().step_by(stride.max(1)).collect();
+    judge_these(oracle, (precision, OWN_MARGIN_FACTOR), batches, answers, chosen)
+}
+
+/// Judges an engine with an arithmetic of its own where `agreement` says it is unlike `scalar`.
+pub fn judge_unlike<S: Real>(
+    oracle: &Oracle,
+    precision: Precision,
+    batches: &[Rays<S>],
+    answers: &Answers<S>,
+    agreement: &Agreement,
+) -> Counts {
+    let mut unlike = agreement.unlike.iter().copied().peekable();
+    let chosen = places(batches).enumerate().filter(|(n, _)| unlike.next_if_eq(&(*n as u64)).is_some());
+    judge_these(oracle, (precision, OWN_MARGIN_FACTOR), batches, answers, chosen.collect())
+}
+
+/// Batch and slot of every ray.
+fn places<S: Real>(batches: &[Rays<S>]) -> impl Iterator<Item = (usize, usize)> {
+    batches.iter().enumerate().flat_map(|(b, rays)| (0..rays.len()).map(move |i| (b, i)))
+}
+
+fn judge_these<S: Real>(
+    oracle: &Oracle,
+    (precision, factor): (Precision, f64),
+    batches: &[Rays<S>],
+    answers: &Answers<S>,
+    chosen: Vec<(usize, (usize, usize))>,
+) -> Counts {
     let judge_one = |(number, (b, i)): (usize, (usize, usize))| {
         let ray = oracle_ray(&batches[b], i);
         let (hit, verdict) = match answers {
             Answers::Closest(hits) => {
                 let answer = engine_hit(&hits[b], i);
-                (answer.is_some(), oracle.judge(&ray, answer, precision))
+                (answer.is_some(), oracle.judge_within(&ray, answer, precision, factor))
             }
             Answers::Any(flags) => {
                 let occluded = flags[b][i] != 0;
-                (occluded, oracle.judge_occluded(&ray, occluded, precision))
+                (occluded, oracle.judge_occluded_within(&ray, occluded, precision, factor))
             }
         };
         (hit, with_number(verdict, number))

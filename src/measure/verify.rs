@@ -1,14 +1,16 @@
-//! Verification: every engine, query and ray class against the f64 oracle, and bit for bit against `scalar`.
+//! Verification: every engine, query and ray class against the f64 oracle, and bit for bit against `scalar`, or, where
+//! an engine has an arithmetic of its own, against itself in another order.
 
 use crate::error::{Error, Result};
 use crate::measure::answers::Answers;
+use crate::measure::bench::precision;
 use crate::measure::eye::{Framing, View};
 use crate::measure::raysets::{Query, RayKind, convert};
 use crate::measure::timing::Workers;
 use crate::measure::truth::{self, Counts};
 use crate::ray::Rays;
 use crate::reference::Oracle;
-use crate::scene::description::{Description, Precision};
+use crate::scene::description::Description;
 use crate::scene::world::{Preset, World};
 use crate::trace::{Engine, Engines, engine};
 
@@ -48,11 +50,12 @@ pub struct Line {
     pub hits: u64,
     /// Judged by the oracle.
     pub oracle: Counts,
-    /// Rays whose bits differ from the `scalar` engine's.
+    /// Rays whose bits differ from the `scalar` engine's; not counted for engines with an arithmetic of their own.
     pub bit_differences: u64,
     /// The first of them, with both answers.
     pub first_difference: Option<String>,
-    /// Rays whose bits change when the same rays come in another order and in other batches.
+    /// Rays whose bits change when the same rays come in another order and in other batches (engines with an arithmetic
+    /// of their own: the same batches in another order).
     pub order_differences: u64,
     /// Why the engine was not run.
     pub skipped: Option<String>,
@@ -151,11 +154,19 @@ impl<S: Engines> Bench<'_, S> {
             let difference = answers.difference(&scalar);
             line.hits = answers.hit_count();
             // The same bits get the same verdicts; only an engine that differs is judged anew.
-            line.oracle = if difference.is_some() { self.judge(batches, &answers) } else { judged.clone() };
-            line.bit_differences = difference.as_ref().map_or(0, |d| d.count);
-            line.first_difference = difference.map(|d| format!("ray {}: {}", d.first, d.text));
-            let reordered = self.answers(engine, query, &shuffled.batches);
-            line.order_differences = shuffled.differences(&answers, &reordered);
+            line.oracle = match (&difference, engine.is_exact()) {
+                (None, _) => judged.clone(),
+                (Some(_), true) => self.judge(batches, &answers),
+                (Some(_), false) => self.judge_own(batches, &answers),
+            };
+            if engine.is_exact() {
+                line.bit_differences = difference.as_ref().map_or(0, |d| d.count);
+                line.first_difference = difference.map(|d| format!("ray {}: {}", d.first, d.text));
+                let reordered = self.answers(engine, query, &shuffled.batches);
+                line.order_differences = shuffled.differences(&answers, &reordered);
+            } else {
+                line.order_differences = self.backwards(engine, query, batches, &answers);
+            }
             report(line);
         }
         Ok(())
@@ -167,9 +178,21 @@ impl<S: Engines> Bench<'_, S> {
         answers
     }
 
+    /// Rays whose answers change when the same batches come in reverse.
+    fn backwards(&self, engine: &dyn Engine<S>, query: Query, batches: &[Rays<S>], answers: &Answers<S>) -> u64 {
+        let reversed: Vec<Rays<S>> = batches.iter().rev().cloned().collect();
+        let again = self.answers(engine, query, &reversed);
+        let last = batches.len().saturating_sub(1);
+        let places = batches.iter().enumerate().flat_map(|(b, rays)| (0..rays.len()).map(move |i| (b, i)));
+        places.filter(|&(b, i)| !answers.same_as(b, i, &again, last - b, i)).count() as u64
+    }
+
     fn judge(&self, batches: &[Rays<S>], answers: &Answers<S>) -> Counts {
-        let precision = if S::PRECISION == "f64" { Precision::F64 } else { Precision::F32 };
-        self.workers.install(|| truth::judge(self.oracle, precision, batches, answers, 1))
+        self.workers.install(|| truth::judge(self.oracle, precision::<S>(), batches, answers, 1))
+    }
+
+    fn judge_own(&self, batches: &[Rays<S>], answers: &Answers<S>) -> Counts {
+        self.workers.install(|| truth::judge_own(self.oracle, precision::<S>(), batches, answers, 1))
     }
 }
 

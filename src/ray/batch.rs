@@ -139,6 +139,15 @@ impl<S: Real> Hits<S> {
         }
     }
 
+    /// Makes this `len` hits and misses, with unspecified contents: for who writes all of them.
+    pub fn prepare(&mut self, len: usize) {
+        if self.t.len() == len.next_multiple_of(PAD) {
+            self.len = len;
+        } else {
+            self.reset(len);
+        }
+    }
+
     /// Number of hits and misses, without padding.
     pub fn len(&self) -> usize {
         self.len

@@ -76,11 +76,22 @@ pub enum Verdict {
 impl Oracle {
     /// Judges an engine's closest hit (`None`: a miss) of `ray`. `precision` is the arithmetic of the engine.
     pub fn judge(&self, ray: &OracleRay, answer: Option<EngineHit>, precision: Precision) -> Verdict {
+        self.judge_within(ray, answer, precision, self.margin_factor)
+    }
+
+    /// [`Oracle::judge`] with another margin factor.
+    pub fn judge_within(
+        &self,
+        ray: &OracleRay,
+        answer: Option<EngineHit>,
+        precision: Precision,
+        margin_factor: f64,
+    ) -> Verdict {
         let truth = self.closest_of(ray);
         if truth.is_none() && answer.is_none() {
             return Verdict::Agree;
         }
-        let case = Case { oracle: self, ray, margin: Margin::new(self.margin_factor, precision) };
+        let case = Case { oracle: self, ray, margin: Margin::new(margin_factor, precision) };
         if let (Some(hit), Some(answer)) = (truth, answer)
             && case.agrees(&hit, &answer)
         {
@@ -93,11 +104,22 @@ impl Oracle {
 
     /// Judges an engine's any-hit answer of `ray`: whether it is `occluded`.
     pub fn judge_occluded(&self, ray: &OracleRay, occluded: bool, precision: Precision) -> Verdict {
+        self.judge_occluded_within(ray, occluded, precision, self.margin_factor)
+    }
+
+    /// [`Oracle::judge_occluded`] with another margin factor.
+    pub fn judge_occluded_within(
+        &self,
+        ray: &OracleRay,
+        occluded: bool,
+        precision: Precision,
+        margin_factor: f64,
+    ) -> Verdict {
         let truth = self.closest_of(ray);
         if truth.is_some() == occluded {
             return Verdict::Agree;
         }
-        let case = Case { oracle: self, ray, margin: Margin::new(self.margin_factor, precision) };
+        let case = Case { oracle: self, ray, margin: Margin::new(margin_factor, precision) };
         let why = if occluded { case.grazed() } else { case.skipped(None).map(|why| why.unwrap_or(Why::Edge)) };
         why.map(Verdict::Explained).unwrap_or_else(|fault| {
             Verdict::Unexplained(format!("{fault}; {ray:?}; engine occluded {occluded}; oracle {truth:?}"))

@@ -11,18 +11,19 @@ use sha2::{Digest, Sha256};
 use super::description::{Description, Item, ItemKind};
 use super::kdl::meshes::{MeshFile, MeshFiles, add_mesh_materials};
 use super::mesh::Mesh;
-use super::{builtin, kdl, obj, ply, stl, unpack};
+use super::reference::References;
+use super::{builtin, gltf, kdl, obj, ply, stl, unpack};
 use crate::error::{Error, Result, nearest_name};
 
-/// Extensions that [`load`] reads; meshes may also be packed (`.ply.gz`, `.obj.zst`).
-pub const EXTENSIONS: [&str; 4] = ["kdl", "obj", "ply", "stl"];
+/// Extensions that [`load`] reads; all but `kdl` may also be packed (`.ply.gz`, `.glb.zst`).
+pub const EXTENSIONS: [&str; 6] = ["kdl", "obj", "ply", "stl", "gltf", "glb"];
 
 /// How to open a scene.
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
     /// `--set NAME=VALUE` pairs, applied to the parameters of a scene file.
     pub set: Vec<(String, String)>,
-    /// Allow mesh references that leave the scene file's folder.
+    /// Allow references to files that leave the scene file's folder.
     pub allow_outside: bool,
 }
 
@@ -37,6 +38,7 @@ pub fn load(scene: &str, options: &LoadOptions) -> Result<Description> {
     let path = Path::new(scene);
     let mut description = match extension(path)?.as_str() {
         "kdl" => scene_file(path, options)?,
+        "gltf" | "glb" => gltf_scene(path, options)?,
         _ => mesh_scene(path, options)?,
     };
     description.source = Some(path.to_path_buf());
@@ -53,11 +55,24 @@ fn scene_file(path: &Path, options: &LoadOptions) -> Result<Description> {
     kdl::parse(path, &stem(path), &bytes, &options.set, &files)
 }
 
-/// A scene of one mesh, which has no parameters to set.
-fn mesh_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
-    if let Some((name, _)) = options.set.first() {
-        return Err(Error::Usage(format!("--set {name}: {} has no parameters", path.display())));
+fn gltf_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
+    refuse_set(path, options)?;
+    let bytes = unpack::read_file(path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    gltf::parse(path, &stem(path), &bytes, &References { folder: Some(folder), allow_outside: options.allow_outside })
+}
+
+/// Only our own scene files have parameters.
+fn refuse_set(path: &Path, options: &LoadOptions) -> Result<()> {
+    match options.set.first() {
+        Some((name, _)) => Err(Error::Usage(format!("--set {name}: {} has no parameters", path.display()))),
+        None => Ok(()),
     }
+}
+
+/// A scene of one mesh.
+fn mesh_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
+    refuse_set(path, options)?;
     let MeshFile { mesh, digest } = read_mesh(path)?;
     let mut description = Description::new(stem(path));
     description.hash = digest.iter().map(|b| format!("{b:02x}")).collect();
@@ -76,6 +91,10 @@ pub fn read_mesh(path: &Path) -> Result<MeshFile> {
         "obj" => |path, bytes| obj::parse(path, bytes).map(|file| file.mesh),
         "ply" => ply::parse,
         "stl" => stl::parse,
+        "gltf" | "glb" => {
+            let error = Error::whole(path, "expected a mesh file (.obj, .ply or .stl): glTF holds a whole scene");
+            return Err(error.with_help("open the glTF file by itself"));
+        }
         _ => return Err(Error::whole(path, "expected a mesh file: .obj, .ply or .stl")),
     };
     let bytes = unpack::read_file(path)?;
@@ -89,7 +108,7 @@ fn extension(path: &Path) -> Result<String> {
         return Ok(inner);
     }
     let all: Vec<String> = EXTENSIONS.iter().map(|e| format!(".{e}")).collect();
-    let what = format!("expected a scene ({}, meshes also .gz or .zst) or builtin:NAME", all.join(" "));
+    let what = format!("expected a scene ({}, all but .kdl also .gz or .zst) or builtin:NAME", all.join(" "));
     let error = Error::whole(path, what);
     Err(match nearest_name(&inner, EXTENSIONS).or(nearest_name(&path.to_string_lossy(), builtin::NAMES)) {
         Some(near) if builtin::NAMES.contains(&near) => error.with_help(format!("did you mean `builtin:{near}`?")),

@@ -4,11 +4,13 @@
 pub mod assembly;
 pub mod builtin;
 pub mod description;
+pub mod gltf;
 pub mod kdl;
 pub mod load;
 pub mod mesh;
 pub mod obj;
 pub mod ply;
+pub mod reference;
 pub mod stl;
 mod text;
 pub mod unpack;

@@ -2,7 +2,7 @@
 //!
 //! All generic engines run the same kernels at different widths: `brute` and `scalar` at width 1 (without and with
 //! the tree), `packetN` at N lanes. Their hits are equal to the last bit; [`crate::ray::slab`] says why. `tile` has its
-//! own arithmetic and the same hits: where rounding could tell, it asks the common kernel.
+//! own arithmetic, and hits that differ where rounding can tell; `tile-exact` asks the common kernel there.
 
 mod brute;
 mod bundle;
@@ -34,6 +34,11 @@ pub trait Engine<S: Real>: Sync {
     fn name(&self) -> &'static str;
     /// Rays traced together.
     fn lanes(&self) -> usize;
+    /// Whether the hits are those of the common formulas, bit for bit. Others are repeatable, whatever the threads and
+    /// the order of batches, but a ray's answer may depend on its neighbours where rounding can tell.
+    fn is_exact(&self) -> bool {
+        true
+    }
     /// Closest hit of each ray of `rays` into `hits` (reset to the batch's length). With `counters`, the counting
     /// build of the same kernels runs and adds to them.
     fn intersect(
@@ -75,7 +80,8 @@ impl Engines for f32 {
             &Generic::<f32x4, true>("packet4", PhantomData),
             &Generic::<f32x8, true>("packet8", PhantomData),
             &Generic::<f32x16, true>("packet16", PhantomData),
-            &tile::Tile,
+            &tile::Tile::<true>,
+            &tile::Tile::<false>,
         ]
     }
 
@@ -103,17 +109,23 @@ impl Engines for f64 {
     }
 }
 
+/// Name of the fastest engine on coherent rays that [`Engine::is_exact`].
+pub const EXACT_ENGINE: &str = "auto-exact";
+
 /// The engine called `name`; `auto` is the fastest one of the precision on coherent rays (the last of the list, which
-/// hands what does not suit it to the packets).
+/// hands what does not suit it to the packets), [`EXACT_ENGINE`] the fastest exact one.
 ///
 /// # Errors
 /// A usage error that lists the names and the nearest one.
 pub fn engine<S: Engines>(name: &str) -> Result<&'static dyn Engine<S>> {
-    let names = || S::engines().iter().map(|e| e.name()).chain(["auto"]);
-    if let ("auto", Some(engine)) = (name, S::engines().last()) {
-        return Ok(*engine);
-    }
-    S::engines().iter().copied().find(|e| e.name() == name).ok_or_else(|| {
+    let names = || S::engines().iter().map(|e| e.name()).chain(["auto", EXACT_ENGINE]);
+    let engines = || S::engines().iter().copied();
+    let found = match name {
+        "auto" => engines().next_back(),
+        EXACT_ENGINE => engines().rfind(|e| e.is_exact()),
+        _ => engines().find(|e| e.name() == name),
+    };
+    found.ok_or_else(|| {
         let near = nearest_name(name, names()).map_or(String::new(), |n| format!("; did you mean `{n}`?"));
         let list = names().collect::<Vec<_>>().join(", ");
         Error::Usage(format!("no engine `{name}` in {}: there are {list}{near}", S::PRECISION))

@@ -5,7 +5,6 @@
 //! traversal of packed rays and the writing of t, u, v and primitive. A peer's own primitive numbers become ours after
 //! the clock has stopped, so that no look-up of ours is counted against it.
 
-pub mod check;
 pub mod embree;
 pub mod obvhs;
 pub mod triangles;

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use glam::{DAffine3, DVec3};
 
-use super::check::compare;
 use super::*;
+use crate::measure::agreement::compare;
 use crate::measure::answers::Answers;
 use crate::scene::description::{Description, Group, Item, ItemKind};
 use crate::scene::mesh::Mesh;

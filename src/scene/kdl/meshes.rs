@@ -1,13 +1,13 @@
 //! Meshes of a scene: files, generated ones, polygons. Each distinct one is stored once.
 
 use std::collections::{BTreeSet, HashMap};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::source::quote;
 use crate::error::Result;
 use crate::scene::description::{Description, Material};
 use crate::scene::mesh::Mesh;
+use crate::scene::reference::References;
 
 /// Most triangles that generators and polygons of one document may make.
 pub const MAX_GENERATED: u64 = 1 << 24;
@@ -35,27 +35,9 @@ impl MeshFiles<'_> {
     /// The file that a scene means by `written`.
     ///
     /// # Errors
-    /// References that leave the folder (absolute, through `..`, or through a symbolic link) unless that is
-    /// allowed, and files that do not exist.
+    /// Those of [`References::resolve`].
     pub fn resolve(&self, written: &str) -> std::result::Result<PathBuf, String> {
-        let Some(folder) = self.folder else { return Err("a built-in scene refers to no files".into()) };
-        let relative = Path::new(written);
-        let inside = relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-        let outside = || format!("{} leaves the scene's folder", quote(written));
-        if written.is_empty() || written.contains('\0') {
-            return Err("expected the name of a mesh file".into());
-        }
-        if !inside && !self.allow_outside {
-            return Err(outside());
-        }
-        let cannot = |e: std::io::Error| format!("cannot open {}: {e}", quote(written));
-        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        let file = folder.join(relative).canonicalize().map_err(cannot)?;
-        let folder = folder.canonicalize().map_err(cannot)?;
-        if !self.allow_outside && !file.starts_with(&folder) {
-            return Err(outside());
-        }
-        Ok(file)
+        References { folder: self.folder, allow_outside: self.allow_outside }.resolve(written)
     }
 }
 

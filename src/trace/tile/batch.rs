@@ -3,8 +3,16 @@
 //!
 //! With q the corners relative to the ray at each corner's depth, an edge function is q x q' in the picture plane.
 //! Seen from the apex it is linear in (s, t), so it is set up once per triangle and costs two operations per ray.
+//! Its products are not fused: neighbours of an edge see the same number with opposite sign. Around a corner that is
+//! not enough (rounding may show a ray outside of every triangle of a fan), so an edge function counts as inside down
+//! to minus its rounding error: no ray passes between triangles.
 //!
-//! **Certainty.** The common formula (`shape::triangle`) is what decides hits; this arithmetic rounds elsewhere. Both
+//! **Accuracy** of the tile's own answers: they are exact for corners moved by a few half ulps of their distance (and
+//! of the tile's width where triangles are much smaller than pixels); the normal is taken without cancellation, and
+//! depths are moved into the triangle's own, so that needles and triangles seen edge-on keep theirs. That also makes
+//! answers independent of the order of triangles: the nearest wins, then the smallest primitive number.
+//!
+//! **Certainty** (`EXACT`). The common formula (`shape::triangle`) is what decides hits; this arithmetic rounds elsewhere. Both
 //! are exact for corners moved by at most `moved` = 16 half ulps of their distance (differences, three products of a
 //! rotation, the ray's own s and t or shear), so an edge function beyond `eps` has the same sign in both, and depths
 //! that differ by more than the factor 1 + `rho` have the same order. What lies between is given to the common
@@ -21,6 +29,23 @@ pub const BATCH: usize = 16;
 /// Movement of corners that covers the rounding of both formulas, in half ulps of the distance.
 const MOVED: f32 = 16.0;
 
+/// Spanned volume (of a scene of unit size) from which on products of coordinates keep their digits.
+const LEAST_VOLUME: f32 = 1e-30;
+
+/// Edge functions that change sign within the tile may be wrong by what moves an edge this far, in half ulps of the
+/// distance.
+const MOST_SHIFT: f32 = 10.0 * HALF_ULP;
+
+/// Edge functions must add up to this many times their error, so that there is something to divide by.
+const LEAST_SUM: f32 = 8.0;
+
+/// Relative rounding error of sums of products in the common formula.
+const PRODUCTS: f32 = 8.0 * HALF_ULP;
+
+/// The same in the tile's own, counted over all operations: of slopes times the tile's width, and of the value at the
+/// ray they are made around.
+const OWN_PRODUCTS: [f32; 2] = [14.0 * HALF_ULP, 10.0 * HALF_ULP];
+
 /// A depth interval wider than this says nothing.
 const WILD: f32 = 0.25;
 
@@ -29,8 +54,8 @@ const WILD: f32 = 0.25;
 #[repr(C, align(64))]
 pub struct Batch {
     corners: [[f32; BATCH + 8]; 9],
-    /// Block * 8 + place.
-    pub slot: [u32; BATCH + 8],
+    /// Primitive number; `EXACT`: block * 8 + place.
+    pub id: [u32; BATCH + 8],
     /// Groups that met the leaf.
     pub groups: [u32; BATCH + 8],
     len: usize,
@@ -38,7 +63,7 @@ pub struct Batch {
 
 impl Default for Batch {
     fn default() -> Self {
-        Self { corners: [[0.0; BATCH + 8]; 9], slot: [0; BATCH + 8], groups: [0; BATCH + 8], len: 0 }
+        Self { corners: [[0.0; BATCH + 8]; 9], id: [0; BATCH + 8], groups: [0; BATCH + 8], len: 0 }
     }
 }
 
@@ -56,6 +81,21 @@ pub struct Planes {
     pub most: [f32; BATCH],
     /// See `most`.
     pub least: [f32; BATCH],
+    /// 1/z at the triangle's nearest and farthest corner.
+    pub nearest: [f32; BATCH],
+    /// See `nearest`.
+    pub farthest: [f32; BATCH],
+    /// Own answers: what was added to the edge functions.
+    pub eps: [[f32; BATCH]; 3],
+    /// Any-hit: the first corner and the normal that points away from the apex, in the axes of the geometry and
+    /// the scale of the frame.
+    pub side: [[f32; BATCH]; 6],
+    /// Own answers: triangles too small for this arithmetic or seen edge-on, bit by triangle.
+    pub wild: u32,
+    /// Own answers: triangles whose edges need more digits, bit by triangle.
+    pub unsteady: u32,
+    /// Where there are any: the corners in the frame.
+    pub corners: [[[f32; BATCH]; 3]; 3],
     /// Signs of x and y of each linear function, bit by triangle.
     pub negative: [[u32; 2]; 4],
 }
@@ -75,27 +115,35 @@ impl Batch {
 
     /// Adds the first `count` triangles of a block; there must be room.
     #[inline(always)]
-    pub fn push(&mut self, block: &Block<f32, 9>, first_slot: u32, count: usize, groups: u32) {
+    pub fn push<const EXACT: bool>(&mut self, block: &Block<f32, 9>, first_slot: u32, count: usize, groups: u32) {
         let at = self.len.min(BATCH);
         for (to, from) in self.corners.iter_mut().zip(&block.fields) {
             to[at..at + 8].copy_from_slice(from);
         }
-        for i in 0..8 {
-            self.slot[at + i] = first_slot + i as u32;
-            self.groups[at + i] = groups;
-        }
+        let own: [u32; 8] = std::array::from_fn(|i| first_slot + i as u32);
+        self.id[at..at + 8].copy_from_slice(if EXACT { &own } else { &block.prim });
+        self.groups[at..at + 8].fill(groups);
         self.len = at + count;
+    }
+
+    /// Corners of a waiting triangle.
+    pub fn corners(&self, i: usize) -> [f32; 9] {
+        std::array::from_fn(|f| self.corners[f][i])
     }
 
     /// Sets up what waits. Returns the triangles that may be seen from the tile.
     #[inline(always)]
-    pub fn set_up(&self, groups: &Groups, planes: &mut Planes) -> u32 {
+    pub fn set_up<const ANY: bool, const EXACT: bool>(&self, groups: &Groups, planes: &mut Planes) -> u32 {
         let apex = groups.frame.apex.map(V::splat);
         let p: [Lanes3<V>; 3] = [0, 1, 2].map(|i| {
             let corner = [0, 1, 2].map(|a| V::load(&self.corners[3 * i + a]) - apex[a]);
             groups.frame.coordinates(corner)
         });
         let (d1, d2) = (minus(p[1], p[0]), minus(p[2], p[0]));
+        if !EXACT {
+            let sides = [sum(minus(d2, d1)), sum(d2), sum(d1)];
+            return self.set_up_own::<ANY>(groups, planes, &p, cross_accurate(d1, d2), sides);
+        }
         let normal = cross(d1, d2);
         let volume = dot(normal, p[0]);
         let rcp = V::constant(1.0) / volume;
@@ -117,14 +165,67 @@ impl Batch {
         pick(eps, V::splat(f32::INFINITY)).store(&mut planes.inside);
         most.store(&mut planes.most);
         pick(one - rho, zero).store(&mut planes.least);
-        planes.store(groups, &linear, eps, most) & ((1u32 << self.len) - 1)
+        planes.store(groups, &linear, eps, |inverse| inverse * most) & ((1u32 << self.len) - 1)
+    }
+
+    /// Set-up for the tile's own answers.
+    #[inline(always)]
+    fn set_up_own<const ANY: bool>(
+        &self,
+        groups: &Groups,
+        planes: &mut Planes,
+        p: &[Lanes3<V>; 3],
+        normal: Lanes3<V>,
+        sides: [V; 3],
+    ) -> u32 {
+        let volume = dot(normal, p[0]);
+        let (zero, one) = (V::constant(0.0), V::constant(1.0));
+        let rcp = one / volume;
+        let back = volume.cmp_lt(zero);
+        let faced = |x: V| select(back, -x, x);
+        if ANY {
+            let scale = V::splat(groups.frame.scale);
+            let corner = [0, 1, 2].map(|i| [0, 1, 2].map(|a| V::load(&self.corners[3 * i + a]) * scale));
+            let away = cross_accurate(minus(corner[1], corner[0]), minus(corner[2], corner[0])).map(faced);
+            let side = corner[0].into_iter().chain(away);
+            planes.side.iter_mut().zip(side).for_each(|(to, x)| x.store(to));
+        }
+        let (edges, eps) = own_edges(groups, p);
+        let edges = edges.map(|e| e.map(faced));
+        // A corner beside or behind the apex sets no bound to what is nearest.
+        let low = p[0][2].fast_min(p[1][2]).fast_min(p[2][2]);
+        let high = p[0][2].fast_max(p[1][2]).fast_max(p[2][2]);
+        let nearest = select(zero.cmp_lt(low), one / low, V::splat(f32::MAX));
+        let farthest = one / high;
+        nearest.store(&mut planes.nearest);
+        farthest.store(&mut planes.farthest);
+
+        let most = sum(p[0]).fast_max(sum(p[1])).fast_max(sum(p[2])) * V::splat(MOST_SHIFT);
+        let size = volume.abs();
+        let mut steady = zero.cmp_lt(high);
+        for k in 0..3 {
+            let near = eps[k].cmp_le(sides[k] * most) | eps[k].cmp_lt(groups.smallest(&edges[k]));
+            steady = steady & near & (eps[k] * high * V::splat(LEAST_SUM)).cmp_le(size);
+        }
+        let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
+        planes.wild = in_front & !V::splat(LEAST_VOLUME).cmp_le(size).bits();
+        planes.unsteady = in_front & !steady.bits();
+        if planes.unsteady != 0 {
+            planes.corners = p.map(|q| q.map(V::to_array));
+        }
+        // With its rounding error added, an edge function is positive wherever the exact one is.
+        let [e0, e1, e2] = [0, 1, 2].map(|k| [edges[k][0], edges[k][1], edges[k][2] + eps[k]]);
+        planes.eps.iter_mut().zip(eps).for_each(|(to, x)| x.store(to));
+        let own = |inverse: V| nearest.fast_min(farthest.fast_max(inverse));
+        planes.store(groups, &[e0, e1, e2, normal.map(|n| n * rcp)], zero, own) & in_front | planes.wild
     }
 }
 
 impl Planes {
     /// Keeps the linear functions; returns the triangles whose largest values over the tile do not rule them out.
+    /// `bound` is the largest 1/z that may be found, from the largest value of its function.
     #[inline(always)]
-    fn store(&mut self, groups: &Groups, linear: &[Lanes3<V>; 4], eps: V, most: V) -> u32 {
+    fn store(&mut self, groups: &Groups, linear: &[Lanes3<V>; 4], eps: V, bound: impl Fn(V) -> V) -> u32 {
         let zero = V::constant(0.0);
         let [[s0, s1], [t0, t1]] = groups.bounds.map(|b| b.map(V::splat));
         let mut seen = V::splat(f32::INFINITY);
@@ -133,7 +234,7 @@ impl Planes {
             self.negative[k] = negative.map(LaneMask::bits);
             let (s, t) = (select(negative[0], s0, s1), select(negative[1], t0, t1));
             let value = f[0].mul_add(s, f[1].mul_add(t, f[2]));
-            let margin = if k < 3 { value + eps } else { value * most - V::splat(groups.nearest) };
+            let margin = if k < 3 { value + eps } else { bound(value) - V::splat(groups.nearest) };
             seen = seen.fast_min(margin);
             for (to, x) in self.linear[k].iter_mut().zip(f) {
                 x.store(to);
@@ -149,17 +250,52 @@ impl Planes {
 fn doubt(groups: &Groups, p: &[Lanes3<V>; 3], length: V, area: V, rcp: V) -> (V, V) {
     let largest = |f: &dyn Fn(Lanes3<V>) -> V| f(p[0]).fast_max(f(p[1])).fast_max(f(p[2]));
     let distance = largest(&sum);
-    let wide = V::splat(groups.wide);
-    let spread = largest(&|q: Lanes3<V>| wide.mul_add(q[2].abs(), q[0].abs().fast_max(q[1].abs())));
     let moved = distance.mul_add(V::splat(MOVED * HALF_ULP), V::splat(groups.slack));
     // At the depth of a corner, a ray off the axis magnifies what is along the axis.
     let slant = 1.0 + 1.5 * groups.wide;
-    let products = V::splat(8.0 * HALF_ULP);
-    let eps = moved * length * V::splat(2.0 * slant * slant) + spread * spread * products + V::splat(f32::MIN_POSITIVE);
+    let products = V::splat(PRODUCTS);
+    let eps = moved * length * V::splat(2.0 * slant * slant) + rounding(groups, p);
     // Corners that move by `moved` move the plane no farther; 8 half ulps for the products of either formula, which
     // are as large as the sides, and for the dot products.
     let shift = area * products.mul_add(distance, moved) + products * length * length * length;
     (eps, (shift * rcp.abs()).mul_add(V::splat(slant), V::splat(MOVED * HALF_ULP)))
+}
+
+/// Rounding error of an edge function of the common formula, for the corners as they are.
+#[inline(always)]
+fn rounding(groups: &Groups, p: &[Lanes3<V>; 3]) -> V {
+    let wide = V::splat(groups.wide);
+    let spread = p.map(|q| wide.mul_add(q[2].abs(), q[0].abs().fast_max(q[1].abs())));
+    let spread = spread[0].fast_max(spread[1]).fast_max(spread[2]);
+    spread * spread * V::splat(PRODUCTS) + V::splat(f32::MIN_POSITIVE)
+}
+
+/// The tile's own edge functions, unfaced, and their rounding errors for the corners as they are.
+///
+/// They are made around a ray of the tile close to the triangle, so that what rounds is as large as the triangle, not
+/// as its distance from the tile's axis: with x', y' seen from that ray, `y1 z2 - z1 y2` is `y1' z2 - z1 y2'`.
+#[inline(always)]
+fn own_edges(groups: &Groups, p: &[Lanes3<V>; 3]) -> ([Lanes3<V>; 3], [V; 3]) {
+    let zero = V::constant(0.0);
+    let z0 = p[0][2];
+    let near_ray = |axis: usize| {
+        let [lo, hi] = groups.bounds[axis].map(V::splat);
+        lo.fast_max(hi.fast_min(select(zero.cmp_lt(z0), p[0][axis] / z0, zero)))
+    };
+    let (s0, t0) = (near_ray(0), near_ray(1));
+    let seen = p.map(|q| [(-s0).mul_add(q[2], q[0]), (-t0).mul_add(q[2], q[1]), q[2]]);
+    let reach = seen.map(|q| q[0].abs().fast_max(q[1].abs()));
+    let pairs = [(1, 2), (2, 0), (0, 1)];
+    let edges = pairs.map(|(i, j)| {
+        let [x, y, at_ray] = cross(seen[i], seen[j]);
+        [x, y, (-x).mul_add(s0, (-y).mul_add(t0, at_ray))]
+    });
+    let eps = pairs.map(|(i, j)| {
+        let slope = reach[i] * p[j][2].abs() + reach[j] * p[i][2].abs();
+        let products = reach[i] * reach[j] * V::splat(OWN_PRODUCTS[1]) + V::splat(f32::MIN_POSITIVE);
+        slope.mul_add(V::splat(OWN_PRODUCTS[0] * groups.wide), products)
+    });
+    (edges, eps)
 }
 
 #[inline(always)]
@@ -170,6 +306,18 @@ fn minus(a: Lanes3<V>, b: Lanes3<V>) -> Lanes3<V> {
 #[inline(always)]
 fn cross(a: Lanes3<V>, b: Lanes3<V>) -> Lanes3<V> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The same to about an ulp per component, whatever cancels (Kahan's difference of products; Jeannerod, Louvet, Muller,
+/// "Further analysis of Kahan's algorithm", Math. Comp. 82, 2013).
+#[inline(always)]
+fn cross_accurate(a: Lanes3<V>, b: Lanes3<V>) -> Lanes3<V> {
+    let minor = |i: usize, j: usize| {
+        let product = a[j] * b[i];
+        let error = (-a[j]).mul_add(b[i], product);
+        a[i].mul_add(b[j], -product) + error
+    };
+    [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
 #[inline(always)]

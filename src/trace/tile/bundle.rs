@@ -1,6 +1,7 @@
 //! What the rays of a block have in common: the point they start from, or (any-hit) the point they end in.
 
 use super::{BLOCK, GROUPS, HALF_ULP, Mask, V, select};
+use crate::lanes::words::prefetch;
 use crate::lanes::{LaneMask, Lanes, Lanes3};
 use crate::ray::{Packet, Rays};
 
@@ -56,6 +57,16 @@ pub fn groups(rays: &Rays<f32>, first: usize) -> usize {
     (rays.padded_len() - first).min(BLOCK) / V::N
 }
 
+/// Asks the memory for the block that starts with ray `first`.
+#[inline(always)]
+pub fn prefetch_rays(rays: &Rays<f32>, first: usize) {
+    let [x, y, z] = &rays.org;
+    let [dx, dy, dz] = &rays.dir;
+    for array in [x, y, z, dx, dy, dz, &rays.t_min, &rays.t_max] {
+        (first..first + BLOCK).step_by(V::N).for_each(|i| prefetch(array, i));
+    }
+}
+
 impl<'a> Bundle<'a> {
     /// Looks at a block of rays; `None` if they have no point in common. `any`: a common end will do.
     #[inline(always)]
@@ -91,6 +102,15 @@ impl<'a> Bundle<'a> {
     /// Groups with a lane that is traced from the apex.
     pub fn groups(&self) -> u32 {
         (0..GROUPS).fold(0, |mask, g| mask | u32::from(self.tame[g] != 0) << g)
+    }
+
+    /// Where the segments of a group start.
+    #[inline(always)]
+    pub fn starts(&self, g: usize) -> Lanes3<V> {
+        let at = self.first + g * V::N;
+        let (org, dir) = (load3(&self.rays.org, at), load3(&self.rays.dir, at));
+        let t_min = V::load(&self.rays.t_min[at..]);
+        [0, 1, 2].map(|a| t_min.mul_add(dir[a], org[a]))
     }
 
     #[inline(always)]

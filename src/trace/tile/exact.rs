@@ -1,7 +1,8 @@
 //! Where the common formula has the word: doubtful pairs while a tile is traced, and the numbers of its final hits.
 
+use super::batch::Planes;
 use super::bundle::Bundle;
-use super::groups::{Groups, NO_SLOT, bounded};
+use super::groups::{Groups, NO_SLOT, bounded, merge};
 use super::{Mask, V, select};
 use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes};
@@ -71,6 +72,39 @@ impl Exact<'_> {
         }
         Final { hit, denied }
     }
+}
+
+/// One triangle against the rays of one group: takes certain hits. Returns their lanes, and the lanes where only the
+/// common formula can tell.
+#[inline(always)]
+pub fn certain_pair<const ANY: bool>(
+    groups: &mut Groups,
+    planes: &Planes,
+    g: usize,
+    i: usize,
+    slot: u32,
+) -> (u32, u32) {
+    let (s, t) = (groups.s[g], groups.t[g]);
+    let (inv_lo, inv_hi) = (groups.inv_lo[g], groups.inv_hi[g]);
+    let value = |k: usize| {
+        let [x, y, z] = [0, 1, 2].map(|x| V::splat(planes.linear[k][x][i]));
+        x.mul_add(s, y.mul_add(t, z))
+    };
+    let edge = value(0).fast_min(value(1)).fast_min(value(2));
+    let inv_z = value(3);
+    let (hi, lo) = (inv_z * V::splat(planes.most[i]), inv_z * V::splat(planes.least[i]));
+    let possible = V::splat(planes.outside[i]).cmp_le(edge) & inv_lo.cmp_le(hi);
+    let certain =
+        possible & V::splat(planes.inside[i]).cmp_le(edge) & inv_hi.cmp_lt(lo) & hi.cmp_lt(V::splat(groups.cap));
+    if ANY {
+        groups.inv_lo[g] = select(certain, V::splat(f32::INFINITY), inv_lo);
+        groups.done[g] |= certain.bits();
+    } else {
+        groups.inv_lo[g] = select(certain, lo, inv_lo);
+        groups.inv_hi[g] = select(certain, hi, inv_hi);
+        groups.slot[g] = merge(certain, slot, groups.slot[g]);
+    }
+    (certain.bits(), possible.bits() & !certain.bits())
 }
 
 /// Decides by the common formula whether a triangle is hit by `lanes` of a group, and whether it is nearer than what

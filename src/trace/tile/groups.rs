@@ -21,12 +21,19 @@ pub struct Groups {
     pub s: [V; GROUPS],
     /// Second ray coordinate.
     pub t: [V; GROUPS],
-    /// The best hit (or the end of the segment) is surely not farther than this.
+    /// The best hit (or the end of the segment) is surely not farther than this. Own answers: it is there.
     pub inv_lo: [V; GROUPS],
-    /// The best hit is surely not nearer than this.
+    /// The best hit is surely not nearer than this. Own answers: no hit may be nearer than this, the segment's start.
     pub inv_hi: [V; GROUPS],
-    /// Triangle of the best hit: block * 8 + place, or [`NO_SLOT`].
+    /// Triangle of the best hit, as [`super::batch::Batch::id`] has it, or [`NO_SLOT`].
     pub slot: [[u32; 16]; GROUPS],
+    /// Own answers: edge functions of the best hit, those of the second and third corner and the sum of all.
+    pub weights: [[V; 3]; GROUPS],
+    /// Rays with a common end: where their segments start, in the axes of the geometry and
+    /// the scale of the frame.
+    pub start: [Lanes3<V>; GROUPS],
+    /// Some segment ends before the common point.
+    pub ends_early: bool,
     /// Depth per unit of the ray's parameter.
     pub speed: [V; GROUPS],
     /// Lanes that found something (any-hit).
@@ -64,6 +71,9 @@ impl Default for Groups {
             inv_lo: zero,
             inv_hi: zero,
             slot: [[NO_SLOT; 16]; GROUPS],
+            weights: [[zero[0]; 3]; GROUPS],
+            start: [[zero[0]; 3]; GROUPS],
+            ends_early: false,
             speed: zero,
             done: [0; GROUPS],
             rect: [[zero[0]; 2]; 2],
@@ -100,7 +110,7 @@ struct Lines {
 impl Groups {
     /// Takes in some groups of a bundle. False if they spread too wide for one frame (nothing is traced then).
     #[inline(always)]
-    pub fn load(&mut self, bundle: &Bundle, groups: u32, scene: &Aabb<f32>) -> bool {
+    pub fn load<const EXACT: bool>(&mut self, bundle: &Bundle, groups: u32, scene: &Aabb<f32>) -> bool {
         let Some(frame) = Frame::of(bundle, groups, scene) else { return false };
         self.frame = frame;
         let most = V::splat(f32::INFINITY);
@@ -122,6 +132,9 @@ impl Groups {
             }
             let lanes = Mask::from_bits(tame);
             (self.s[g], self.t[g], self.speed[g]) = (lines.s, lines.t, lines.speed);
+            if bundle.shared != Shared::Start {
+                self.start[g] = bundle.starts(g).map(|x| x * V::splat(self.frame.scale));
+            }
             lows[0][g] = select(lanes, lines.s, most);
             lows[1][g] = select(lanes, lines.t, most);
             highs[0][g] = select(lanes, -lines.s, most);
@@ -129,7 +142,7 @@ impl Groups {
             near = select(lanes, lines.near, most).fast_min(near);
             reach = select(lanes, lines.reach, reach).fast_max(reach);
             self.inv_lo[g] = select(lanes, bounded(lines.far), most);
-            self.inv_hi[g] = select(lanes, lines.far, most);
+            self.inv_hi[g] = select(lanes, if EXACT { lines.far } else { lines.near }, most);
         }
         self.rect = [0, 1].map(|axis| [row_minima(&lows[axis]), -row_minima(&highs[axis])]);
         self.bounds = self.rect.map(|r| [least(r[0]), greatest(r[1])]);
@@ -139,21 +152,24 @@ impl Groups {
             let scale = V::splat(if hi > lo { 1.0 / (hi - lo) } else { 0.0 });
             self.rect[axis].map(|edge| (edge - V::splat(lo)) * scale)
         });
-        self.loosen(near, greatest(reach), bundle.slack);
+        self.ends_early = least(near) < f32::INFINITY;
+        self.slack = (bundle.slack + 8.0 * HALF_ULP * greatest(reach)) * self.frame.scale;
+        if EXACT || bundle.shared != Shared::Start {
+            self.loosen(near);
+        }
         self.refresh();
         true
     }
 
     /// The ends of the segments, moved apart by what rounding may have done to them.
     #[inline(always)]
-    fn loosen(&mut self, near: V, reach: f32, slack: f32) {
+    fn loosen(&mut self, near: V) {
         let loose = self.loose();
         for g in 0..GROUPS {
             self.inv_lo[g] *= V::splat(1.0 - loose);
             self.inv_hi[g] *= V::splat(1.0 + loose);
         }
         self.cap = least(near) * (1.0 - loose);
-        self.slack = (slack + 8.0 * HALF_ULP * reach) * self.frame.scale;
     }
 
     /// Relative error of depths computed from a ray's parameter.
@@ -198,6 +214,15 @@ impl Groups {
         Lines { s, t, speed, far, near, fit: fit.bits(), reach }
     }
 
+    /// The smallest values of some linear functions over the tile's rectangle.
+    #[inline(always)]
+    pub fn smallest(&self, f: &Lanes3<V>) -> V {
+        let zero = V::constant(0.0);
+        let [[s0, s1], [t0, t1]] = self.bounds.map(|b| b.map(V::splat));
+        let (s, t) = (select(f[0].cmp_lt(zero), s1, s0), select(f[1].cmp_lt(zero), t1, t0));
+        f[0].mul_add(s, f[1].mul_add(t, f[2]))
+    }
+
     /// Brings the per-group depths up to date.
     #[inline(always)]
     pub fn refresh(&mut self) {
@@ -210,6 +235,12 @@ impl Groups {
         self.farthest = greatest(self.far);
         self.nearest = least(self.least);
     }
+}
+
+/// `new` where the mask is set. Numbers are moved as floats: selection copies bits.
+#[inline(always)]
+pub fn merge(mask: Mask, new: u32, old: [u32; 16]) -> [u32; 16] {
+    bytemuck::cast(select(mask, V::splat(f32::from_bits(new)), V::new(bytemuck::cast(old))).to_array())
 }
 
 /// Infinite bounds become the largest number: the lane still wants to hear of hits at zero distance.

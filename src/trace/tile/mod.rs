@@ -2,9 +2,10 @@
 //!
 //! The speed comes from doing per tile what packets do per ray: one node test is eight boxes against the whole tile,
 //! triangles are set up once per tile, and a ray's share of a triangle test is four linear functions of its two
-//! coordinates. Where rounding could matter the common formula decides, so the hits are those of the other engines,
-//! bit by bit ([`batch`] says why). Blocks of rays without a common point, worlds with more than one mesh object and
-//! single odd rays go to the packet kernel.
+//! coordinates. `tile` answers with that arithmetic ([`own`]; [`batch`] states its accuracy). In `tile-exact` the common
+//! formula decides where rounding could matter, so its hits are those of the other engines, bit by bit ([`exact`]).
+//! Blocks of rays without a common point, worlds with more than one mesh object and single odd rays go to the packet
+//! kernel.
 //!
 //! Sources: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm", 2005; Wald, Boulos, Shirley, "Ray tracing
 //! deformable scenes using dynamic bounding volume hierarchies", 2007; Fuetterling, Lojewski, Pfreundt, Ebert,
@@ -16,6 +17,7 @@ mod exact;
 mod frame;
 mod groups;
 mod node;
+mod own;
 mod pairs;
 mod slab;
 mod walk;
@@ -60,9 +62,9 @@ pub struct Memory {
     levels: Vec<node::Level>,
 }
 
-/// The engine.
+/// The engine; `EXACT`: with the hits of the common formula.
 #[derive(Clone, Copy, Debug)]
-pub struct Tile;
+pub struct Tile<const EXACT: bool>;
 
 /// Where answers go.
 enum Output<'a> {
@@ -93,7 +95,7 @@ fn mesh(world: &World<f32>) -> Option<&Object<f32>> {
 }
 
 impl Job<'_> {
-    fn run<const ANY: bool, const COUNT: bool>(&mut self) {
+    fn run<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self) {
         let object = mesh(self.world);
         if let Some(object) = object {
             let depth = object.tree.depth as usize + 1;
@@ -101,27 +103,33 @@ impl Job<'_> {
                 self.memory.levels.resize(depth, node::Level::default());
             }
         }
+        // What one call learns must not change what another one answers.
+        self.memory.slabs.forget();
         for first in (0..self.rays.len()).step_by(BLOCK) {
+            bundle::prefetch_rays(self.rays, first + BLOCK);
             let bundle = object.and_then(|object| Some((object, Bundle::find(self.rays, first, ANY)?)));
             match bundle {
-                Some((object, bundle)) => self.block::<ANY, COUNT>(object, &bundle),
+                Some((object, bundle)) => self.block::<ANY, EXACT, COUNT>(object, &bundle),
                 None => (0..bundle::groups(self.rays, first)).for_each(|g| self.packet::<ANY, COUNT>(first + g * V::N)),
             }
         }
     }
 
     /// Traces a block as one tile, or as four or sixteen where its rays spread too wide, or as packets.
-    fn block<const ANY: bool, const COUNT: bool>(&mut self, object: &Object<f32>, bundle: &Bundle) {
+    fn block<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, object: &Object<f32>, bundle: &Bundle) {
         let all = bundle.groups();
-        if self.tile::<ANY, COUNT>(object, bundle, all) {
+        for g in (0..bundle::groups(self.rays, bundle.first)).filter(|g| all >> g & 1 == 0) {
+            self.packet::<ANY, COUNT>(bundle.first + g * V::N);
+        }
+        if self.tile::<ANY, EXACT, COUNT>(object, bundle, all) {
             return;
         }
         for quarter in [0xf, 0xf0, 0xf00, 0xf000] {
-            if self.tile::<ANY, COUNT>(object, bundle, all & quarter) {
+            if self.tile::<ANY, EXACT, COUNT>(object, bundle, all & quarter) {
                 continue;
             }
             for g in (0..GROUPS).filter(|g| (all & quarter) >> g & 1 != 0) {
-                if !self.tile::<ANY, COUNT>(object, bundle, 1 << g) {
+                if !self.tile::<ANY, EXACT, COUNT>(object, bundle, 1 << g) {
                     self.packet::<ANY, COUNT>(bundle.first + g * V::N);
                 }
             }
@@ -130,41 +138,56 @@ impl Job<'_> {
 
     /// Traces some groups as a tile, unless they spread too wide.
     #[inline(always)]
-    fn tile<const ANY: bool, const COUNT: bool>(&mut self, object: &Object<f32>, bundle: &Bundle, groups: u32) -> bool {
+    fn tile<const ANY: bool, const EXACT: bool, const COUNT: bool>(
+        &mut self,
+        object: &Object<f32>,
+        bundle: &Bundle,
+        groups: u32,
+    ) -> bool {
         if groups == 0 {
             return true;
         }
-        if !self.memory.groups.load(bundle, groups, &object.tree.bounds) {
+        if !self.memory.groups.load::<EXACT>(bundle, groups, &object.tree.bounds) {
             return false;
         }
         let exact = Exact { bundle, object };
-        walk::walk::<ANY, COUNT>(self.memory, &exact, groups, self.counters);
+        walk::walk::<ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         for g in (0..GROUPS).filter(|g| groups >> g & 1 != 0) {
-            self.finish::<ANY, COUNT>(&exact, g);
+            self.finish::<ANY, EXACT, COUNT>(&exact, g);
         }
         true
     }
 
     /// Writes a group's answers; rays that were not for the tile are traced now.
     #[inline(always)]
-    fn finish<const ANY: bool, const COUNT: bool>(&mut self, exact: &Exact, g: usize) {
+    fn finish<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, exact: &Exact, g: usize) {
         let first = exact.bundle.first + g * V::N;
         let mut odd = exact.bundle.odd[g];
         if COUNT {
             self.counters.rays += u64::from((exact.bundle.tame[g] | odd).count_ones());
         }
-        let groups = &self.memory.groups;
         if ANY {
-            let mut done = groups.done[g];
+            let mut done = self.memory.groups.done[g];
             if odd != 0 {
                 done |= self.rest::<ANY, COUNT>(first, odd, None).1;
             }
             self.put_any(first, done);
             return;
         }
+        if !EXACT && odd == 0 {
+            if let Output::Closest(hits) = &mut self.output {
+                self.memory.groups.store_own(g, self.rays, hits, first);
+            }
+            return;
+        }
         let (packet, t_max, _) = Packet::<V>::load(self.rays, first);
-        let exact::Final { mut hit, denied } = exact.finish(groups, g, &packet, t_max);
-        odd |= denied;
+        let mut hit = if EXACT {
+            let exact::Final { hit, denied } = exact.finish(&self.memory.groups, g, &packet, t_max);
+            odd |= denied;
+            hit
+        } else {
+            self.memory.groups.own_hits(g, self.rays, first)
+        };
         if odd != 0 {
             hit = self.rest::<ANY, COUNT>(first, odd, Some(hit)).0;
         }
@@ -208,13 +231,17 @@ impl Job<'_> {
     }
 }
 
-impl Engine<f32> for Tile {
+impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
     fn name(&self) -> &'static str {
-        "tile"
+        if EXACT { "tile-exact" } else { "tile" }
     }
 
     fn lanes(&self) -> usize {
         BLOCK
+    }
+
+    fn is_exact(&self) -> bool {
+        EXACT
     }
 
     fn intersect(
@@ -225,8 +252,8 @@ impl Engine<f32> for Tile {
         scratch: &mut Scratch,
         counters: Option<&mut Counters>,
     ) {
-        hits.reset(rays.len());
-        call::<false>(world, rays, Output::Closest(hits), scratch, counters);
+        hits.prepare(rays.len());
+        call::<false, EXACT>(world, rays, Output::Closest(hits), scratch, counters);
     }
 
     fn occluded(
@@ -239,11 +266,11 @@ impl Engine<f32> for Tile {
     ) {
         out.clear();
         out.resize(rays.len(), 0);
-        call::<true>(world, rays, Output::Any(out), scratch, counters);
+        call::<true, EXACT>(world, rays, Output::Any(out), scratch, counters);
     }
 }
 
-fn call<const ANY: bool>(
+fn call<const ANY: bool, const EXACT: bool>(
     world: &World<f32>,
     rays: &Rays<f32>,
     output: Output,
@@ -253,10 +280,10 @@ fn call<const ANY: bool>(
     let Scratch { single: stack, tile: memory, .. } = scratch;
     stack.reserve(world.stack_bound());
     match counters {
-        Some(counters) => Job { world, rays, memory, stack, counters, output }.run::<ANY, true>(),
+        Some(counters) => Job { world, rays, memory, stack, counters, output }.run::<ANY, EXACT, true>(),
         None => {
             let counters = &mut Counters::default();
-            Job { world, rays, memory, stack, counters, output }.run::<ANY, false>();
+            Job { world, rays, memory, stack, counters, output }.run::<ANY, EXACT, false>();
         }
     }
 }

@@ -95,9 +95,9 @@ impl Planes {
         planes
     }
 
-    /// Tests the children of `node`; fills in `level` if any is met.
+    /// Tests the children of `node`; returns those that are met, and fills in `level` if any is.
     #[inline(always)]
-    pub fn open(&self, node: &Node<f32>, level: &mut Level) -> bool {
+    pub fn open(&self, node: &Node<f32>, level: &mut Level) -> u32 {
         let zero = Half::splat(0.0);
         let (mut sum, mut size) = ([zero; 3], [zero; 3]);
         for a in 0..3 {
@@ -122,7 +122,7 @@ impl Planes {
         let in_front = zero.cmp_le(mz + rz).bits();
         let met = !outside & in_front & ((1u32 << node.used.min(8)) - 1);
         if met == 0 {
-            return false;
+            return 0;
         }
         left.store(&mut level.edges[0]);
         right.store(&mut level.edges[1]);
@@ -131,7 +131,7 @@ impl Planes {
         let near = mz - rz;
         level.near = near.to_array();
         level.keys = upper_halves(near.fast_max(zero), met);
-        true
+        met
     }
 }
 

@@ -1,9 +1,11 @@
 //! Set-up triangles against groups and rays.
 
 use super::batch::Planes;
-use super::exact::{Exact, decide};
+use super::bundle::Shared;
+use super::exact::{self, Exact, certain_pair};
 use super::groups::Groups;
-use super::{Memory, V, select};
+use super::own::{self, own_depth, pair, pair_to_end, pair_unsteady};
+use super::{Memory, V};
 use crate::lanes::words::list_bits;
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::Counters;
@@ -23,17 +25,32 @@ impl Default for Pairs {
 
 /// Sets up the waiting triangles and takes their hits.
 #[inline(never)]
-pub fn flush<const ANY: bool, const COUNT: bool>(memory: &mut Memory, exact: &Exact, counters: &mut Counters) {
+pub fn flush<const ANY: bool, const EXACT: bool, const COUNT: bool>(
+    memory: &mut Memory,
+    exact: &Exact,
+    counters: &mut Counters,
+) {
     let Memory { groups, batch, planes, pairs, slabs, .. } = memory;
-    let seen = batch.set_up(groups, planes);
-    let count = list(seen, &batch.groups, groups, planes, pairs);
+    let seen = batch.set_up::<ANY, EXACT>(groups, planes);
+    let count = list::<EXACT>(seen, &batch.groups, groups, planes, pairs);
     let mut found = 0;
+    let to_end = matches!(exact.bundle.shared, Shared::End(_));
     for k in 0..count {
         let (g, i) = (usize::from(pairs.group[k]) & 15, usize::from(pairs.triangle[k]) & 15);
-        let (certain, doubtful) = pair::<ANY>(groups, planes, g, i, batch.slot[i]);
-        found += usize::from(certain | doubtful != 0);
-        if doubtful != 0 {
-            decide::<ANY>(groups, exact, g, batch.slot[i], doubtful);
+        if EXACT {
+            let (certain, doubtful) = certain_pair::<ANY>(groups, planes, g, i, batch.id[i]);
+            found += usize::from(certain | doubtful != 0);
+            if doubtful != 0 {
+                exact::decide::<ANY>(groups, exact, g, batch.id[i], doubtful);
+            }
+        } else if planes.wild >> i & 1 != 0 {
+            found += usize::from(own::decide::<ANY>(groups, exact, g, batch.corners(i), batch.id[i]));
+        } else if planes.unsteady >> i & 1 != 0 {
+            found += usize::from(pair_unsteady::<ANY>(groups, planes, g, i, batch.id[i], to_end));
+        } else if ANY && to_end {
+            found += usize::from(pair_to_end(groups, planes, g, i));
+        } else {
+            found += usize::from(pair::<ANY>(groups, planes, g, i, batch.id[i]));
         }
         if COUNT {
             counters.prims += 1;
@@ -51,7 +68,7 @@ pub fn flush<const ANY: bool, const COUNT: bool>(memory: &mut Memory, exact: &Ex
 
 /// Lists the pairs whose rectangles and depths meet; returns how many.
 #[inline(always)]
-fn list(seen: u32, wanted: &[u32], groups: &Groups, planes: &Planes, pairs: &mut Pairs) -> usize {
+fn list<const EXACT: bool>(seen: u32, wanted: &[u32], groups: &Groups, planes: &Planes, pairs: &mut Pairs) -> usize {
     let mut count = 0;
     let mut rest = seen;
     while rest != 0 {
@@ -65,41 +82,16 @@ fn list(seen: u32, wanted: &[u32], groups: &Groups, planes: &Planes, pairs: &mut
             x.mul_add(s, y.mul_add(t, z))
         };
         let edge = largest(0).fast_min(largest(1)).fast_min(largest(2));
-        let met = V::splat(planes.outside[i]).cmp_le(edge) & groups.least.cmp_le(largest(3) * V::splat(planes.most[i]));
-        let mask = met.bits() & wanted[i];
+        let inverse = largest(3);
+        let inverse = if EXACT { inverse * V::splat(planes.most[i]) } else { own_depth(planes, i, inverse) };
+        let outside = if EXACT { V::splat(planes.outside[i]) } else { V::constant(0.0) };
+        let met = outside.cmp_le(edge) & groups.least.cmp_le(inverse);
+        let unknown = if !EXACT && planes.wild >> i & 1 != 0 { V::ALL } else { 0 };
+        let mask = (met.bits() | unknown) & wanted[i];
         let at = count.min(256);
         let Some(list) = pairs.group[at..].first_chunk_mut() else { break };
         count = at + list_bits(mask, list);
         pairs.triangle[at..at + 16].fill(i as u8);
     }
     count
-}
-
-/// One triangle against the rays of one group: takes certain hits. Returns their lanes, and the lanes where only the
-/// common formula can tell.
-#[inline(always)]
-fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usize, slot: u32) -> (u32, u32) {
-    let (s, t) = (groups.s[g], groups.t[g]);
-    let (inv_lo, inv_hi) = (groups.inv_lo[g], groups.inv_hi[g]);
-    let value = |k: usize| {
-        let [x, y, z] = [0, 1, 2].map(|x| V::splat(planes.linear[k][x][i]));
-        x.mul_add(s, y.mul_add(t, z))
-    };
-    let edge = value(0).fast_min(value(1)).fast_min(value(2));
-    let inv_z = value(3);
-    let (hi, lo) = (inv_z * V::splat(planes.most[i]), inv_z * V::splat(planes.least[i]));
-    let possible = V::splat(planes.outside[i]).cmp_le(edge) & inv_lo.cmp_le(hi);
-    let certain =
-        possible & V::splat(planes.inside[i]).cmp_le(edge) & inv_hi.cmp_lt(lo) & hi.cmp_lt(V::splat(groups.cap));
-    if ANY {
-        groups.inv_lo[g] = select(certain, V::splat(f32::INFINITY), inv_lo);
-        groups.done[g] |= certain.bits();
-    } else {
-        groups.inv_lo[g] = select(certain, lo, inv_lo);
-        groups.inv_hi[g] = select(certain, hi, inv_hi);
-        // Triangle numbers are moved as floats: selection copies bits.
-        let old = V::new(bytemuck::cast(groups.slot[g]));
-        groups.slot[g] = bytemuck::cast(select(certain, V::splat(f32::from_bits(slot)), old).to_array());
-    }
-    (certain.bits(), possible.bits() & !certain.bits())
 }

@@ -31,6 +31,11 @@ impl Default for Slabs {
 }
 
 impl Slabs {
+    /// Nothing is known.
+    pub fn forget(&mut self) {
+        self.score = 0;
+    }
+
     /// A new tile: what was learnt counts half.
     #[inline(always)]
     pub fn start(&mut self) {

@@ -7,14 +7,15 @@ use super::pairs::flush;
 use super::{GROUPS, Memory, V};
 use crate::bvh::{Child, Node};
 use crate::lanes::Lanes;
-use crate::lanes::words::least_key;
+use crate::lanes::words::{least_key, prefetch};
 use crate::ray::Counters;
+use crate::scene::world::Object;
 
 use super::batch::BATCH;
 
 /// Traces what is loaded in `memory` through the object.
 #[inline(always)]
-pub fn walk<const ANY: bool, const COUNT: bool>(
+pub fn walk<const ANY: bool, const EXACT: bool, const COUNT: bool>(
     memory: &mut Memory,
     exact: &Exact,
     groups: u32,
@@ -27,7 +28,7 @@ pub fn walk<const ANY: bool, const COUNT: bool>(
     let planes = Planes::of(&memory.groups);
     let mut limit = limit(memory);
     let mut depth = 0;
-    if !open::<COUNT>(&planes, root, 0, groups, &mut memory.levels[0], counters) {
+    if !open::<COUNT>(exact.object, &planes, root, 0, groups, &mut memory.levels[0], counters) {
         return;
     }
     loop {
@@ -51,18 +52,18 @@ pub fn walk<const ANY: bool, const COUNT: bool>(
         }
         let child = node.child(slot);
         if child.is_leaf() {
-            leaf::<ANY, COUNT>(memory, exact, child, met, counters);
+            leaf::<ANY, EXACT, COUNT>(memory, exact, child, met, counters);
             limit = self::limit(memory);
         } else {
             let node = &tree.nodes[child.index as usize];
             let below = &mut memory.levels[depth + 1];
-            if open::<COUNT>(&planes, node, child.index, met, below, counters) {
+            if open::<COUNT>(exact.object, &planes, node, child.index, met, below, counters) {
                 depth += 1;
             }
         }
     }
     if memory.batch.len() > 0 {
-        flush::<ANY, COUNT>(memory, exact, counters);
+        flush::<ANY, EXACT, COUNT>(memory, exact, counters);
     }
 }
 
@@ -75,6 +76,7 @@ fn limit(memory: &Memory) -> u32 {
 
 #[inline(always)]
 fn open<const COUNT: bool>(
+    object: &Object<f32>,
     planes: &Planes,
     node: &Node<f32>,
     index: u32,
@@ -88,15 +90,26 @@ fn open<const COUNT: bool>(
         counters.node_lanes_active += u64::from(groups.count_ones()) * V::N as u64;
         counters.node_lanes_total += (GROUPS * V::N) as u64;
     }
-    let met = planes.open(node, level);
-    if met {
-        (level.node, level.groups) = (index, groups);
+    let mut met = planes.open(node, level);
+    if met == 0 {
+        return false;
     }
-    met
+    (level.node, level.groups) = (index, groups);
+    // Most of them are visited, one after the other: their way from memory starts now.
+    while met != 0 {
+        let child = node.child(met.trailing_zeros() as usize & 7);
+        met &= met - 1;
+        if child.is_leaf() {
+            prefetch(&object.triangles, child.index as usize);
+        } else {
+            prefetch(&object.tree.nodes, child.index as usize);
+        }
+    }
+    true
 }
 
 #[inline(always)]
-fn leaf<const ANY: bool, const COUNT: bool>(
+fn leaf<const ANY: bool, const EXACT: bool, const COUNT: bool>(
     memory: &mut Memory,
     exact: &Exact,
     child: Child,
@@ -108,7 +121,7 @@ fn leaf<const ANY: bool, const COUNT: bool>(
         counters.leaves += 1;
     }
     if memory.batch.len() + count > BATCH {
-        flush::<ANY, COUNT>(memory, exact, counters);
+        flush::<ANY, EXACT, COUNT>(memory, exact, counters);
     }
-    memory.batch.push(&exact.object.triangles[child.index as usize], child.index * 8, count, groups);
+    memory.batch.push::<EXACT>(&exact.object.triangles[child.index as usize], child.index * 8, count, groups);
 }

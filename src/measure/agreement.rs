@@ -1,4 +1,4 @@
-//! Whether a peer found what our engines found, up to rounding.
+//! Whether a peer, or an engine with an arithmetic of its own, found what `scalar` found, up to rounding.
 //!
 //! Two correct tracers with different arithmetic agree on t within a small relative error and on the primitive,
 //! except where surfaces share an edge or coincide. Where a triangle is seen edge-on, or a tracer is not watertight,
@@ -25,6 +25,8 @@ pub struct Agreement {
     pub differences: u64,
     /// The first difference in words.
     pub first: Option<String>,
+    /// Numbers of all rays counted above, ascending.
+    pub unlike: Vec<u64>,
 }
 
 impl Agreement {
@@ -52,6 +54,7 @@ pub fn compare<S: Real>(ours: &Answers<S>, theirs: &Answers<S>) -> Agreement {
     }
     let rays = ours.ray_count();
     let missing = rays.max(theirs.ray_count()) - result.rays;
+    result.unlike.extend(result.rays..result.rays + missing);
     Agreement { rays: result.rays + missing, differences: result.differences + missing, ..result }
 }
 
@@ -60,7 +63,10 @@ impl Agreement {
         let (hit, t) = ([a.is_hit(i), b.is_hit(i)], [a.t[i].to_f64(), b.t[i].to_f64()]);
         let near = (t[0] - t[1]).abs() <= TOLERANCE * t[0].abs().max(t[1].abs());
         let same = hit == [false; 2] || hit == [true; 2] && near;
-        self.ties += u64::from(same && (a.prim[i], a.inst[i]) != (b.prim[i], b.inst[i]));
+        if same && (a.prim[i], a.inst[i]) != (b.prim[i], b.inst[i]) {
+            self.ties += 1;
+            self.unlike.push(self.rays);
+        }
         self.count(same, || {
             let one = |h: &Hits<S>| match h.is_hit(i) {
                 true => format!("t {} prim {} inst {}", h.t[i].to_f64(), h.prim[i], h.inst[i]),
@@ -73,6 +79,7 @@ impl Agreement {
     fn count(&mut self, same: bool, text: impl FnOnce() -> String) {
         if !same {
             self.differences += 1;
+            self.unlike.push(self.rays);
             let number = self.rays;
             self.first.get_or_insert_with(|| format!("ray {number}: {}", text()));
         }
@@ -104,6 +111,7 @@ mod tests {
         assert_eq!((agreement.rays, agreement.ties, agreement.differences), (6, 1, 2));
         assert!(agreement.first.as_ref().is_some_and(|text| text.contains("ray 2: t 1 prim 1")), "{agreement:?}");
         assert!(!agreement.passes());
+        assert_eq!(agreement.unlike, [1, 2, 4]);
     }
 
     #[test]

@@ -1,0 +1,50 @@
+//! Which extensions a document may require, and what is said about the others.
+
+use std::path::Path;
+
+use super::json::Root;
+use crate::error::{Error, Result};
+use crate::scene::text;
+
+/// Extensions that are read.
+const READ: [&str; 2] = ["KHR_mesh_quantization", "EXT_mesh_gpu_instancing"];
+/// Beginnings of the names of extensions that say how surfaces look, never where they are.
+const LOOKS: [&str; 5] = ["KHR_materials_", "KHR_texture_", "EXT_texture_", "EXT_materials_", "KHR_lights_"];
+/// Most names of unknown extensions that a warning lists.
+const LISTED: usize = 8;
+
+/// Refuses documents that cannot be shown rightly; warnings about what is not read.
+///
+/// # Errors
+/// A required extension that is not supported and could change geometry.
+pub fn check(file: &Path, root: &Root) -> Result<Vec<String>> {
+    for (i, name) in root.extensions_required.iter().enumerate() {
+        if !is_harmless(name) {
+            let shown = text::shown(name.as_bytes());
+            let what = format!("extensionsRequired[{i}]: the extension {shown} is not supported");
+            let error = Error::whole(file, what);
+            return Err(match name.contains("compression") {
+                true => error.with_help("write the file again without compression"),
+                false => error,
+            });
+        }
+    }
+    let mut warnings = Vec::new();
+    let unknown: Vec<_> = root.extensions_used.iter().filter(|name| !is_harmless(name)).collect();
+    if !unknown.is_empty() {
+        let names: Vec<_> = unknown.iter().take(LISTED).map(|name| text::shown(name.as_bytes())).collect();
+        let more = if unknown.len() > LISTED { ", ..." } else { "" };
+        warnings.push(format!("extensions that are not read: {}{more}", names.join(", ")));
+    }
+    if root.extensions_used.iter().any(|name| **name == *"KHR_lights_punctual") {
+        warnings.push("lights (KHR_lights_punctual) are not read".into());
+    }
+    if !root.skins.is_empty() || !root.animations.is_empty() {
+        warnings.push("skins and animations are not applied".into());
+    }
+    Ok(warnings)
+}
+
+fn is_harmless(name: &str) -> bool {
+    READ.contains(&name) || LOOKS.iter().any(|beginning| name.starts_with(beginning))
+}

@@ -1,0 +1,186 @@
+//! Primitives: vertices and indices become triangle meshes, each distinct one once.
+
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::Document;
+use super::accessor::{INDICES, POSITIONS, View};
+use super::json::Primitive;
+use crate::error::Result;
+use crate::scene::description::{Description, Item, ItemKind, MaterialId};
+use crate::scene::mesh::Mesh;
+
+/// How indices form triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Mode {
+    Triangles,
+    Strip,
+    Fan,
+}
+
+impl Mode {
+    /// Triangles in the order and winding of glTF 2.0, section 3.7.2.1.
+    fn triangles(self, v: &[u32]) -> Vec<[u32; 3]> {
+        let fans = v.len().saturating_sub(2);
+        match self {
+            Self::Triangles => v.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+            Self::Strip => (0..fans).map(|i| [v[i], v[i + 1 + i % 2], v[i + 2 - i % 2]]).collect(),
+            Self::Fan => (0..fans).map(|i| [v[i + 1], v[i + 2], v[0]]).collect(),
+        }
+    }
+
+    fn count(self, corners: usize) -> usize {
+        match self {
+            Self::Triangles => corners / 3,
+            Self::Strip | Self::Fan => corners.saturating_sub(2),
+        }
+    }
+}
+
+/// What makes primitives the same mesh: accessors of positions and of indices, mode.
+type Key = (u32, Option<u32>, Mode);
+
+/// The meshes made so far and what was passed over.
+#[derive(Debug)]
+pub struct Primitives {
+    stored: HashMap<Key, u32>,
+    /// Number of primitives that take their positions from each accessor.
+    users: HashMap<u32, u32>,
+    without_triangles: u64,
+    incomplete: u64,
+}
+
+impl Primitives {
+    /// Nothing read yet.
+    pub fn new(document: &Document<'_>) -> Self {
+        let mut users = HashMap::new();
+        for primitive in document.root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+            if let Some(positions) = primitive.attributes.position {
+                *users.entry(positions).or_default() += 1;
+            }
+        }
+        Self { stored: HashMap::new(), users, without_triangles: 0, incomplete: 0 }
+    }
+
+    /// The items that mesh `index` of the document, which must exist, consists of.
+    ///
+    /// # Errors
+    /// What is wrong with its primitives.
+    pub fn items(&mut self, document: &Document<'_>, index: u32, description: &mut Description) -> Result<Vec<Item>> {
+        let mut items = Vec::new();
+        for (p, primitive) in document.root.meshes[index as usize].primitives.iter().enumerate() {
+            let path = format!("meshes[{index}].primitives[{p}]");
+            let material = material(document, primitive, &path)?;
+            let Some(mesh) = self.mesh(document, primitive, &path, description)? else {
+                self.without_triangles += 1;
+                continue;
+            };
+            items.push(Item { transform: DAffine3::IDENTITY, material, kind: ItemKind::Mesh(mesh) });
+        }
+        Ok(items)
+    }
+
+    /// What was passed over, for the user.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        let skipped = format!("{} primitives without triangles (points, lines) are left out", self.without_triangles);
+        let cut = format!("{} primitives end in an incomplete triangle, which is left out", self.incomplete);
+        let all = [(self.without_triangles, skipped), (self.incomplete, cut)];
+        all.into_iter().filter(|(count, _)| *count > 0).map(|(_, what)| what)
+    }
+
+    fn mesh(
+        &mut self,
+        document: &Document<'_>,
+        primitive: &Primitive,
+        path: &str,
+        description: &mut Description,
+    ) -> Result<Option<u32>> {
+        let mode = match primitive.mode {
+            Some(0..=3) => return Ok(None),
+            None | Some(4) => Mode::Triangles,
+            Some(5) => Mode::Strip,
+            Some(6) => Mode::Fan,
+            Some(other) => return Err(document.error(path, format!("expected a mode from 0 to 6, found {other}"))),
+        };
+        let Some(positions) = primitive.attributes.position else { return Ok(None) };
+        let key = (positions, primitive.indices, mode);
+        if let Some(&stored) = self.stored.get(&key) {
+            return Ok(Some(stored));
+        }
+        let view = document.view(positions, POSITIONS, format_args!("{path}.attributes.POSITION"))?;
+        let draco = primitive.extensions.is_some_and(|e| e.draco.is_some());
+        if draco && document.root.accessors[positions as usize].buffer_view.is_none() {
+            return Err(document.error(path, "has only data compressed by KHR_draco_mesh_compression, not supported"));
+        }
+        let corners = corners(document, primitive.indices, &view, path)?;
+        self.incomplete += u64::from(mode == Mode::Triangles && corners.len() % 3 != 0);
+        let shared = self.users.get(&positions).is_some_and(|&users| users > 1);
+        let mesh = build(document, &view, corners, mode, shared, path)?;
+        let stored = description.meshes.len() as u32;
+        description.meshes.push(Arc::new(mesh));
+        self.stored.insert(key, stored);
+        Ok(Some(stored))
+    }
+}
+
+/// The description's number of a primitive's material.
+fn material(document: &Document<'_>, primitive: &Primitive, path: &str) -> Result<Option<MaterialId>> {
+    let Some(index) = primitive.material else { return Ok(None) };
+    document.get(&document.root.materials, "materials", index, format_args!("{path}.material"))?;
+    // Number 0 is the default material.
+    Ok(Some(index + 1))
+}
+
+/// The vertex indices of a primitive in order, all below the number of vertices.
+fn corners(document: &Document<'_>, indices: Option<u32>, positions: &View<'_>, path: &str) -> Result<Vec<u32>> {
+    let path = format!("{path}.indices");
+    let Some(indices) = indices else {
+        spend(document, positions.count, size_of::<u32>(), path)?;
+        return Ok((0..positions.count as u32).collect());
+    };
+    let view = document.view(indices, INDICES, &path)?;
+    spend(document, view.count, size_of::<u32>(), &path)?;
+    let corners: Vec<u32> = (0..view.count).map(|i| view.index(i)).collect();
+    match corners.iter().position(|&v| v as usize >= positions.count) {
+        Some(at) => {
+            let (index, count) = (corners[at], positions.count);
+            Err(document.error(path, format!("index {index} (number {at}) names no vertex: there are {count}")))
+        }
+        None => Ok(corners),
+    }
+}
+
+/// The mesh of `corners`. Vertices keep the file's order; of those that several primitives share, each mesh has the
+/// ones that it uses: it could be few of very many.
+fn build(
+    document: &Document<'_>,
+    positions: &View<'_>,
+    mut corners: Vec<u32>,
+    mode: Mode,
+    shared: bool,
+    path: &str,
+) -> Result<Mesh> {
+    spend(document, mode.count(corners.len()), size_of::<[u32; 3]>(), path)?;
+    let mut triangles = mode.triangles(&corners);
+    let point = |v: usize| DVec3::from_array(positions.numbers(v));
+    let positions = if shared {
+        corners.sort_unstable();
+        corners.dedup();
+        spend(document, corners.len(), size_of::<DVec3>(), path)?;
+        for corner in triangles.iter_mut().flatten() {
+            *corner = corners.partition_point(|v| v < corner) as u32;
+        }
+        corners.iter().map(|&v| point(v as usize)).collect()
+    } else {
+        spend(document, positions.count, size_of::<DVec3>(), path)?;
+        (0..positions.count).map(point).collect()
+    };
+    Ok(Mesh { positions, triangles, groups: Vec::new() })
+}
+
+fn spend(document: &Document<'_>, count: usize, size: usize, path: impl Display) -> Result<()> {
+    document.spend((count as u64).saturating_mul(size as u64), path)
+}

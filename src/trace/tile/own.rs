@@ -1,0 +1,218 @@
+//! The tile's own answers: hits by its own arithmetic, whose accuracy [`super::batch`] states. They are repeatable and
+//! watertight, and differ from the common formula's where rounding can tell two answers apart.
+
+use glam::DVec3;
+
+use super::batch::Planes;
+use super::exact::Exact;
+use super::groups::{Groups, NO_SLOT, merge};
+use super::{Mask, V, select};
+use crate::lanes::words::{below, positions};
+use crate::lanes::{LaneMask, Lanes};
+use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
+use crate::shape::{Block, Triangle};
+
+/// 1/z of triangle `i` where its plane says `inverse`: not nearer and not farther than its corners.
+#[inline(always)]
+pub fn own_depth(planes: &Planes, i: usize, inverse: V) -> V {
+    V::splat(planes.nearest[i]).fast_min(V::splat(planes.farthest[i]).fast_max(inverse))
+}
+
+/// One triangle against the rays of one group that share their origin. Whether it was hit.
+#[inline(always)]
+pub fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usize, prim: u32) -> bool {
+    let (inside, [e0, e1, e2]) = inside(groups, planes, g, i);
+    let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
+    let best = groups.inv_lo[g];
+    let inside = inside & inverse.cmp_le(groups.inv_hi[g]);
+    if ANY {
+        return occlude(groups, g, inside & best.cmp_le(inverse));
+    }
+    let tie = best.cmp_eq(inverse) & Mask::from_bits(below(prim, &groups.slot[g]));
+    let hit = inside & (best.cmp_lt(inverse) | tie);
+    groups.inv_lo[g] = select(hit, inverse, best);
+    groups.slot[g] = merge(hit, prim, groups.slot[g]);
+    // A hit just outside of an edge is reported on it.
+    let inner = |e: V, k: usize| (e - V::splat(planes.eps[k][i])).fast_max(V::constant(0.0));
+    let (e0, e1, e2) = (inner(e0, 0), inner(e1, 1), inner(e2, 2));
+    let weights = &mut groups.weights[g];
+    weights[0] = select(hit, e1, weights[0]);
+    weights[1] = select(hit, e2, weights[1]);
+    weights[2] = select(hit, e0 + e1 + e2, weights[2]);
+    hit.any()
+}
+
+/// One triangle against the rays of one group that share their end (any-hit). Whether it was hit.
+///
+/// Such rays start on surfaces, a few roundings in front of them. Depths from the far end cannot tell which side of
+/// its own surface a ray starts on; where the start lies with respect to the triangle's plane can.
+#[inline(always)]
+pub fn pair_to_end(groups: &mut Groups, planes: &Planes, g: usize, i: usize) -> bool {
+    let (inside, _) = inside(groups, planes, g, i);
+    let behind = behind(groups, planes, g, i);
+    let mut hit = inside & V::constant(0.0).cmp_le(behind) & groups.inv_lo[g].cmp_lt(V::splat(f32::INFINITY));
+    if groups.ends_early {
+        hit = hit & own_depth(planes, i, linear(groups, planes, g, i, 3)).cmp_le(groups.inv_hi[g]);
+    }
+    occlude(groups, g, hit)
+}
+
+/// How far the segments of a group start behind a triangle's plane as seen from their common end; in some unit.
+#[inline(always)]
+fn behind(groups: &Groups, planes: &Planes, g: usize, i: usize) -> V {
+    let [x, y, z] = [0, 1, 2].map(|a| groups.start[g][a] - V::splat(planes.side[a][i]));
+    let [nx, ny, nz] = [3, 4, 5].map(|a| V::splat(planes.side[a][i]));
+    nz.mul_add(z, ny.mul_add(y, nx * x))
+}
+
+/// [`pair`] for a triangle whose edges need more digits than f32 has: a sliver, or one much smaller than a pixel. What is
+/// not certainly outside is looked at again in f64, for the same corners and rays.
+#[cold]
+#[inline(never)]
+pub fn pair_unsteady<const ANY: bool>(
+    groups: &mut Groups,
+    planes: &Planes,
+    g: usize,
+    i: usize,
+    prim: u32,
+    to_end: bool,
+) -> bool {
+    let (inside, _) = inside(groups, planes, g, i);
+    let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
+    let best = groups.inv_lo[g];
+    let mut maybe = inside & inverse.cmp_le(groups.inv_hi[g]);
+    if ANY && to_end {
+        maybe = maybe & V::constant(0.0).cmp_le(behind(groups, planes, g, i)) & best.cmp_lt(V::splat(f32::INFINITY));
+    } else {
+        maybe = maybe & best.cmp_le(inverse);
+    }
+    if !ANY {
+        maybe = maybe & (best.cmp_lt(inverse) | Mask::from_bits(below(prim, &groups.slot[g])));
+    }
+    let (mut rest, mut hit) = (maybe.bits(), 0);
+    let mut weights = groups.weights[g].map(V::to_array);
+    while rest != 0 {
+        let lane = rest.trailing_zeros() as usize & 15;
+        rest &= rest - 1;
+        let ray = [groups.s[g].to_array()[lane], groups.t[g].to_array()[lane], 1.0].map(f64::from);
+        let corners = planes.corners.map(|p| p.map(|x| f64::from(x[i])));
+        if let Some(found) = weights_f64(corners, ray) {
+            hit |= 1 << lane;
+            (0..3).for_each(|k| weights[k][lane] = found[k] as f32);
+        }
+    }
+    let hit = Mask::from_bits(hit);
+    if ANY {
+        return occlude(groups, g, hit);
+    }
+    groups.inv_lo[g] = select(hit, inverse, best);
+    groups.slot[g] = merge(hit, prim, groups.slot[g]);
+    groups.weights[g] = weights.map(V::new);
+    hit.any()
+}
+
+/// Weights of the second and third corner and one, if the ray through the apex meets the triangle.
+fn weights_f64(corners: [[f64; 3]; 3], ray: [f64; 3]) -> Option<[f64; 3]> {
+    let [a, b, c] = corners.map(|p| [p[0] - ray[0] * p[2], p[1] - ray[1] * p[2]]);
+    let cross = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
+    // Seen along the ray; nothing may pass between neighbours, so a rounding error counts as inside.
+    let spread = [a, b, c].into_iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let edges = [cross(b, c), cross(c, a), cross(a, b)];
+    let sum = edges[0] + edges[1] + edges[2];
+    let eps = 16.0 * f64::EPSILON * spread * spread;
+    // The side of the triangle that faces the apex.
+    let [p, q, r] = corners.map(DVec3::from_array);
+    let facing = p.dot(q.cross(r)).signum();
+    let inside = edges.iter().all(|e| e * facing >= -eps);
+    (inside && sum != 0.0).then(|| [(edges[1] / sum).clamp(0.0, 1.0), (edges[2] / sum).clamp(0.0, 1.0), 1.0])
+}
+
+/// A linear function of triangle `i` at the rays of a group.
+#[inline(always)]
+fn linear(groups: &Groups, planes: &Planes, g: usize, i: usize, k: usize) -> V {
+    let [x, y, z] = [0, 1, 2].map(|x| V::splat(planes.linear[k][x][i]));
+    x.mul_add(groups.s[g], y.mul_add(groups.t[g], z))
+}
+
+/// Lanes inside the triangle's edges, and the edge functions.
+#[inline(always)]
+fn inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> (Mask, [V; 3]) {
+    let edges = [0, 1, 2].map(|k| linear(groups, planes, g, i, k));
+    (V::constant(0.0).cmp_le(edges[0].fast_min(edges[1]).fast_min(edges[2])), edges)
+}
+
+/// Lanes that found something want nothing any more.
+#[inline(always)]
+fn occlude(groups: &mut Groups, g: usize, hit: Mask) -> bool {
+    groups.inv_lo[g] = select(hit, V::splat(f32::INFINITY), groups.inv_lo[g]);
+    groups.done[g] |= hit.bits();
+    hit.any()
+}
+
+/// Where the tile's arithmetic is of no use (tiny triangles, triangles seen edge-on): one triangle against one group by
+/// the common formula. Whether it was hit.
+#[cold]
+#[inline(never)]
+pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, corners: [f32; 9], prim: u32) -> bool {
+    let (packet, t_max, _) = Packet::<V>::load(exact.bundle.rays, exact.bundle.first + g * V::N);
+    let mut block = Block::empty();
+    block.set(0, corners, prim);
+    let one = V::constant(1.0);
+    let mut any = false;
+    Triangle::intersect(&packet, &block, 1, exact.bundle.tame[g], |found, lanes, _| {
+        let hit = found.hit & found.t.cmp_le(t_max) & Mask::from_bits(lanes);
+        if ANY {
+            any |= occlude(groups, g, hit);
+            return;
+        }
+        let inverse = (one / (found.t * groups.speed[g])).fast_min(V::splat(f32::MAX));
+        let best = groups.inv_lo[g];
+        let tie = best.cmp_eq(inverse) & Mask::from_bits(below(prim, &groups.slot[g]));
+        let wins = hit & (best.cmp_lt(inverse) | tie);
+        groups.inv_lo[g] = select(wins, inverse, best);
+        groups.slot[g] = merge(wins, prim, groups.slot[g]);
+        for (weight, x) in groups.weights[g].iter_mut().zip([found.u, found.v, one]) {
+            *weight = select(wins, x, *weight);
+        }
+        any |= wins.any();
+    });
+    any
+}
+
+impl Groups {
+    /// Lanes of a group that hit something, and t, u, v there (elsewhere u and v are 0).
+    #[inline(always)]
+    fn own_numbers(&self, g: usize, rays: &Rays<f32>, first: usize) -> (Mask, V, V, V) {
+        let found = Mask::from_bits(!positions(&self.slot[g], NO_SLOT));
+        let one = V::constant(1.0);
+        let (t_min, t_max) = (V::load(&rays.t_min[first..]), V::load(&rays.t_max[first..]));
+        let t = t_min.fast_max(t_max.fast_min(one / (self.inv_lo[g] * self.speed[g])));
+        let [u, v, sum] = self.weights[g];
+        let scale = one / sum;
+        let or_zero = |x: V| select(found, x * scale, V::constant(0.0));
+        (found, t, or_zero(u), or_zero(v))
+    }
+
+    /// Writes a group's own hits and misses; `first` is its first ray.
+    #[inline(always)]
+    pub fn store_own(&self, g: usize, rays: &Rays<f32>, hits: &mut Hits<f32>, first: usize) {
+        let (found, t, u, v) = self.own_numbers(g, rays, first);
+        let zero = V::constant(0.0);
+        select(found, t, V::splat(f32::INFINITY)).store(&mut hits.t[first..]);
+        u.store(&mut hits.u[first..]);
+        v.store(&mut hits.v[first..]);
+        hits.prim[first..first + V::N].copy_from_slice(&self.slot[g]);
+        let none = V::splat(f32::from_bits(INVALID_ID));
+        let inst: [u32; 16] = bytemuck::cast(select(found, zero, none).to_array());
+        hits.inst[first..first + V::N].copy_from_slice(&inst);
+    }
+
+    /// A group's own hits for the packet kernel to go on with.
+    pub fn own_hits(&self, g: usize, rays: &Rays<f32>, first: usize) -> HitPacket<V> {
+        let (found, t, u, v) = self.own_numbers(g, rays, first);
+        let mut hit = HitPacket::new(select(found, t, V::load(&rays.t_max[first..])));
+        (hit.u, hit.v, hit.prim) = (u, v, self.slot[g]);
+        hit.inst = self.slot[g].map(|prim| if prim == NO_SLOT { INVALID_ID } else { 0 });
+        hit
+    }
+}
