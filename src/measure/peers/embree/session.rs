@@ -154,7 +154,7 @@ impl Session {
         u64::try_from(self.reports.bytes.load(Ordering::Relaxed)).unwrap_or(0)
     }
 
-    /// Traces one packet in this session's scene, see [`Session::query_in`].
+    /// Traces one packet in the scene of this Embree device, see [`Session::query_in`].
     #[inline(always)]
     pub fn query<const N: usize, const ANY: bool>(&self, valid: &[u32], packet: &mut [u32], arguments: &mut Arguments) {
         self.query_in::<N, ANY>(self.scene, valid, packet, arguments);
