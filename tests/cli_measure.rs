@@ -135,3 +135,20 @@ fn an_interrupted_bench_ends_with_130_and_valid_output() {
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     assert!(report["rows"].is_array());
 }
+
+#[test]
+fn two_runs_are_compared() {
+    let dir = square();
+    let bench = "bench square.ply --rays primary --engines scalar,packet4 --size 32x32 --repeat 3 --threads 1 -o";
+    run(&dir, &format!("{bench} old"));
+    run(&dir, &format!("{bench} new"));
+    let text = run(&dir, "bench --compare old new/bench.csv").out;
+    assert!(text.contains("square") && text.contains("packet4") && text.contains("scalar"), "{text}");
+    let same = run(&dir, "bench --compare old old --json").json();
+    let rows = same.as_array().expect("rows");
+    assert_eq!(rows.len(), 2);
+    assert!(rows.iter().all(|row| row["verdict"] == "no difference seen" && row["factor"] == 1.0), "{same}");
+    binary::refused(dir.path(), &["bench", "--compare", "old", "nowhere"], "nowhere");
+    std::fs::write(dir.path().join("bad.csv"), "a,b\n1,2\n").expect("a file");
+    binary::refused(dir.path(), &["bench", "--compare", "old", "bad.csv"], "bad.csv:1:1");
+}

@@ -10,6 +10,7 @@ use super::render::{self, RenderArgs};
 use crate::error::{Error, Result};
 use crate::film::write_atomically;
 use crate::measure::bench::{self, Plan};
+use crate::measure::compare;
 use crate::measure::env;
 use crate::measure::peers::Invitation;
 use crate::measure::raysets::RayKind;
@@ -30,9 +31,11 @@ Examples:
   lanecast bench model.ply --rays primary,ao --engines scalar,packet16 --threads 1
   lanecast bench model.ply --size 1024x576 --eye 0,1,5 --look-at 0,1,0 -o results
   lanecast bench model.ply --peers obvhs,embree --embree libembree4.so.4 --threads 1
+  lanecast bench --compare results/before results/after
 
-Before the clock starts, every engine's hits are compared bit for bit with the scalar engine's, and a sample
-of those with the f64 oracle; a wrong engine gets no figure and the exit code is 1. Engines take turns
+Before the clock starts, every engine's hits are compared bit for bit with the scalar engine's (those of tile,
+which has an arithmetic of its own, up to rounding, and the f64 oracle must explain the others), and a sample of
+those with the oracle; a wrong engine gets no figure and the exit code is 1. Engines take turns
 (A B C, A B C, ...) so that a disturbance of the machine falls on all alike. The clock covers traversal of
 packed rays and the writing of hits, nothing else. Peers take their turns in the same run; their hits may
 differ from ours by rounding, but one ray in 100000 at most may differ for another reason.";
@@ -68,6 +71,9 @@ pub struct BenchArgs {
     /// Seed of the random directions
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Show what moved between two runs: folders that -o wrote, or their bench.csv files; nothing is measured
+    #[arg(long, value_names = ["OLD", "NEW"], num_args = 2, conflicts_with_all = ["scenes", "engines", "peers", "folder"])]
+    compare: Vec<PathBuf>,
     /// Folder for bench.csv (one row per figure), bench.env.txt (machine and build) and a picture of each scene
     /// (NAME.exr: colours, depth, normals, ids, node visits)
     #[arg(short = 'o', long = "output", value_name = "DIR")]
@@ -94,6 +100,10 @@ struct Report<'a> {
 /// Bad input; [`Error::Mismatch`] if an engine is wrong; [`Error::Interrupted`]. What was measured before any of them
 /// is printed and written.
 pub fn run(args: &BenchArgs) -> Result<()> {
+    if let [old, new] = &args.compare[..] {
+        let changes = compare::compare(&compare::read(old)?, &compare::read(new)?);
+        return if args.output.json { json_to_stdout(&changes) } else { to_stdout(&compare::table(&changes)) };
+    }
     args.invitation().check()?;
     // Peers ask for it, and then our engines get it too.
     let workers = Workers::new(args.threads.count())?.flushing(!args.peers.is_empty());

@@ -3,6 +3,7 @@
 pub mod agreement;
 pub mod answers;
 pub mod bench;
+pub mod compare;
 pub mod env;
 pub mod eye;
 pub mod peers;
