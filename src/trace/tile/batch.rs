@@ -3,12 +3,12 @@
 //!
 //! With q the corners relative to the ray at each corner's depth, an edge function is q x q' in the picture plane.
 //! Seen from the apex it is linear in (s, t), so it is set up once per triangle and costs two operations per ray.
-//! Its products are not fused: neighbours of an edge see the same number with opposite sign. Around a corner that is
-//! not enough (rounding may show a ray outside of every triangle of a fan), so an edge function counts as inside down
-//! to minus its rounding error: no ray passes between triangles.
 //!
-//! **Accuracy** of the tile's own answers: they are exact for corners moved by a few half ulps of their distance (and
-//! of the tile's width where triangles are much smaller than pixels); the normal is taken without cancellation, and
+//! **Watertight.** Rounding may show a ray outside of two neighbours, or of every triangle around a corner, so the tile's
+//! own edge functions count as inside down to minus their rounding error: no ray passes between triangles.
+//!
+//! **Accuracy** of the tile's own answers: they are exact for corners moved by a few half ulps of their distance. Edges
+//! that f32 cannot place so well (slivers) are looked at again in f64; the normal is taken without cancellation, and
 //! depths are moved into the triangle's own, so that needles and triangles seen edge-on keep theirs. That also makes
 //! answers independent of the order of triangles: the nearest wins, then the smallest primitive number.
 //!
