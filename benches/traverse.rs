@@ -5,16 +5,16 @@
 
 mod common;
 
+use std::borrow::Cow;
+
 use common::{Scene, soup, terrain};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use lanecast::measure::agreement::compare;
 use lanecast::measure::answers::Answers;
 use lanecast::measure::eye::View;
 use lanecast::measure::raysets::{Query, RayKind, convert};
 use lanecast::measure::truth;
 use lanecast::ray::Rays;
 use lanecast::reference::Oracle;
-use lanecast::scene::description::Precision;
 use lanecast::scene::world::{Preset, World};
 use lanecast::trace::{Engine, Engines, Scratch, engine};
 
@@ -76,12 +76,8 @@ fn scene<S: Engines>(criterion: &mut Criterion, scene: &Scene) {
         for engine in S::engines().iter().filter(|e| e.name() != "brute") {
             let mut got = Answers::new(kind.query(), &batches);
             run(*engine, &world, &batches, &mut got, &mut scratch);
-            if engine.is_exact() {
-                assert_eq!(got.difference(&want), None, "{id}: {} against scalar", engine.name());
-            } else {
-                let agreement = compare(&want, &got);
-                let counts = truth::judge_unlike(&oracle, Precision::F32, &batches, &got, &agreement);
-                assert_eq!(counts.unexplained, 0, "{id}: {} {:?}", engine.name(), counts.samples);
+            if let Err(why) = truth::admit(*engine, &batches, &want, &got, || Cow::Borrowed(&oracle)) {
+                panic!("{id}: {}: {why}", engine.name());
             }
             group.bench_function(engine.name(), |b| {
                 b.iter(|| run(*engine, &world, &batches, &mut got, &mut scratch));

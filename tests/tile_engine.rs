@@ -3,29 +3,50 @@
 
 mod common;
 
+use std::borrow::Cow;
+use std::ops::Deref;
 use std::path::Path;
 use std::sync::Arc;
 
 use common::{Random, ball, soup};
 use glam::{DAffine3, DVec3};
-use lanecast::measure::agreement::compare;
 use lanecast::measure::answers::Answers;
 use lanecast::measure::truth;
 use lanecast::ray::{Counters, Hits, Rays};
 use lanecast::reference::Oracle;
-use lanecast::scene::description::{Description, ItemKind, Precision};
+use lanecast::scene::description::{Description, ItemKind};
 use lanecast::scene::mesh::Mesh;
 use lanecast::scene::world::{Preset, World};
 use lanecast::scene::{ply, unpack};
 use lanecast::trace::{Engine, Scratch, engine};
 
-fn compile(meshes: Vec<Mesh>) -> World<f32> {
+/// A world and the oracle that judges it.
+struct Scene {
+    world: World<f32>,
+    oracle: Oracle,
+}
+
+impl Scene {
+    fn new(world: World<f32>) -> Self {
+        Self { oracle: Oracle::new(&world.assembly), world }
+    }
+}
+
+impl Deref for Scene {
+    type Target = World<f32>;
+
+    fn deref(&self) -> &World<f32> {
+        &self.world
+    }
+}
+
+fn compile(meshes: Vec<Mesh>) -> Scene {
     let mut d = Description::new("meshes");
     for (i, mesh) in meshes.into_iter().enumerate() {
         d.meshes.push(Arc::new(mesh));
         d.groups[0].items.push(common::item(ItemKind::Mesh(i as u32), DAffine3::IDENTITY));
     }
-    World::compile(&d, Preset::Balanced).unwrap()
+    Scene::new(World::compile(&d, Preset::Balanced).unwrap())
 }
 
 fn find(name: &str) -> &'static dyn Engine<f32> {
@@ -33,7 +54,7 @@ fn find(name: &str) -> &'static dyn Engine<f32> {
 }
 
 /// How many answers differ from the scalar engine's, bit by bit: closest hits, any-hits.
-fn differences(world: &World<f32>, rays: &Rays<f32>) -> (usize, usize) {
+fn differences(world: &Scene, rays: &Rays<f32>) -> (usize, usize) {
     let mut scratch = Scratch::default();
     let (mut want, mut got) = (Hits::default(), Hits::default());
     find("scalar").intersect(world, rays, &mut want, &mut scratch, None);
@@ -52,16 +73,13 @@ fn differences(world: &World<f32>, rays: &Rays<f32>) -> (usize, usize) {
 }
 
 /// Lets the oracle judge where `own` is not `scalar` up to rounding, and a sample of the rest.
-fn explained(world: &World<f32>, rays: &Rays<f32>, scalar: &Answers<f32>, own: Answers<f32>) {
-    let agreement = compare(scalar, &own);
-    let oracle = Oracle::new(&world.assembly);
-    let batches = std::slice::from_ref(rays);
-    for counts in [
-        truth::judge_unlike(&oracle, Precision::F32, batches, &own, &agreement),
-        truth::judge_own(&oracle, Precision::F32, batches, &own, 199),
-    ] {
-        assert_eq!(counts.unexplained, 0, "{:?}", counts.samples);
+fn explained(scene: &Scene, rays: &Rays<f32>, scalar: &Answers<f32>, own: Answers<f32>) {
+    let (batches, oracle) = (std::slice::from_ref(rays), &scene.oracle);
+    if let Err(why) = truth::admit(find("tile"), batches, scalar, &own, || Cow::Borrowed(oracle)) {
+        panic!("{why}");
     }
+    let counts = truth::judge(oracle, truth::OWN_MARGIN_FACTOR, batches, &own, 199);
+    assert_eq!(counts.unexplained, 0, "{:?}", counts.samples);
 }
 
 /// Morton order in squares of 32.
@@ -99,7 +117,7 @@ fn shadows(world: &World<f32>, rays: &Rays<f32>, light: DVec3, end: f32, t_min: 
     out
 }
 
-fn worlds() -> Vec<(&'static str, World<f32>)> {
+fn worlds() -> Vec<(&'static str, Scene)> {
     let mut r = Random(77);
     let one = soup(2000, &mut r);
     let mut shifted = ball(40, 60);
@@ -258,8 +276,8 @@ fn ends_exactly_at_a_hit() {
 fn incoherent_rays_and_other_worlds_take_the_packet_path() {
     for seed in 0..3 {
         for world in [
-            World::compile(&common::zoo(seed, true), Preset::Balanced).unwrap(),
-            World::compile(&common::zoo(seed, false), Preset::Balanced).unwrap(),
+            Scene::new(World::compile(&common::zoo(seed, true), Preset::Balanced).unwrap()),
+            Scene::new(World::compile(&common::zoo(seed, false), Preset::Balanced).unwrap()),
             compile(vec![soup(1000, &mut Random(seed))]),
         ] {
             assert_eq!(differences(&world, &common::rays(3000, seed)), (0, 0));

@@ -1,5 +1,6 @@
 //! `lanecast trace`: a file of rays through one engine, checked, timed, hits written.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -10,9 +11,7 @@ use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
 use crate::film::npy;
 use crate::lanes::compiled_isa;
-use crate::measure::agreement::compare;
 use crate::measure::answers::Answers;
-use crate::measure::bench::precision;
 use crate::measure::raysets::{Query, split};
 use crate::measure::stats::{Summary, summary};
 use crate::measure::timing::{Series, Tracer, Workers, interleave};
@@ -166,42 +165,11 @@ fn checked<S: Engines>(
     if engine.name() != "scalar" {
         let mut scalar = Answers::new(query, batches);
         workers.pass(self::engine::<S>("scalar")?, world, batches, &mut scalar);
-        if !engine.is_exact() {
-            settle(workers, engine, world, batches, &scalar, &answers)?;
-        } else if let Some(d) = answers.difference(&scalar) {
-            let (name, count, first) = (engine.name(), d.count, d.first);
-            return Err(Error::Mismatch(format!(
-                "{name} differs from scalar in {count} rays, ray {first}: {}",
-                d.text
-            )));
-        }
+        let oracle = || Cow::Owned(Oracle::new(&world.assembly));
+        let admitted = workers.install(|| truth::admit(engine, batches, &scalar, &answers, oracle));
+        admitted.map_err(|why| Error::Mismatch(format!("{}: {why}", engine.name())))?;
     }
     Ok(answers)
-}
-
-/// Lets the oracle judge the answers that are not the `scalar` engine's up to rounding.
-fn settle<S: Engines>(
-    workers: &Workers,
-    engine: &dyn Engine<S>,
-    world: &World<S>,
-    batches: &[Rays<S>],
-    scalar: &Answers<S>,
-    answers: &Answers<S>,
-) -> Result<()> {
-    let agreement = compare(scalar, answers);
-    if agreement.unlike.is_empty() {
-        return Ok(());
-    }
-    let oracle = Oracle::new(&world.assembly);
-    let judge = || truth::judge_unlike(&oracle, precision::<S>(), batches, answers, &agreement);
-    let counts = workers.install(judge);
-    match counts.samples.first() {
-        None => Ok(()),
-        Some(first) => {
-            let (name, count) = (engine.name(), counts.unexplained);
-            Err(Error::Mismatch(format!("{name}: the oracle rejects {count} answers, {first}")))
-        }
-    }
 }
 
 /// Million rays per second; 0 for a file without rays.

@@ -1,5 +1,7 @@
 //! The bench: engines and peers x ray classes of a scene, checked before the clock starts, then timed interleaved.
 
+use std::borrow::Cow;
+
 use crate::error::{Error, Result};
 use crate::measure::agreement::{Agreement, compare};
 use crate::measure::answers::Answers;
@@ -11,8 +13,8 @@ use crate::measure::stats::{median, paired_ratio_median, summary};
 use crate::measure::timing::{Series, Tracer, Workers, interleave};
 use crate::measure::truth;
 use crate::ray::{Counters, Rays};
-use crate::reference::Oracle;
-use crate::scene::description::{Description, Precision};
+use crate::reference::{MARGIN_FACTOR, Oracle};
+use crate::scene::description::Description;
 use crate::scene::world::{Preset, World};
 use crate::trace::{Engine, Engines, engine};
 
@@ -228,7 +230,7 @@ impl<S: Engines> Subject<'_, S> {
         let cost = self.world.assembly.instanced_prims().clamp(1, 100_000);
         let sample = (ORACLE_LIMIT / cost).clamp(1, ORACLE_RAYS);
         let stride = rays.div_ceil(sample).max(1) as usize;
-        let counts = self.workers.install(|| truth::judge(self.oracle, precision::<S>(), batches, scalar, stride));
+        let counts = self.workers.install(|| truth::judge(self.oracle, MARGIN_FACTOR, batches, scalar, stride));
         let total = counts.total();
         let first = counts.samples.first()?;
         Some(format!("the oracle rejects {} of {total} sampled rays, {first}", counts.unexplained))
@@ -252,24 +254,9 @@ impl<S: Engines> Subject<'_, S> {
         }
         let mut answers = scalar.clone();
         self.workers.pass(engine, self.world, batches, &mut answers);
-        if !engine.is_exact() {
-            return self.admit_unlike(batches, scalar, answers);
-        }
-        match answers.difference(scalar) {
-            None => Ok((answers, Agreement::default())),
-            Some(d) => Err(Outcome::Wrong(format!("{} rays differ from scalar, ray {}: {}", d.count, d.first, d.text))),
-        }
-    }
-
-    /// Answers of an arithmetic of its own: the oracle must explain each that is not `scalar`'s up to rounding.
-    fn admit_unlike(&self, batches: &[Rays<S>], scalar: &Answers<S>, answers: Answers<S>) -> Admission<S> {
-        let agreement = compare(scalar, &answers);
-        let judge = || truth::judge_unlike(self.oracle, precision::<S>(), batches, &answers, &agreement);
-        let counts = self.workers.install(judge);
-        match counts.samples.first() {
-            None => Ok((answers, agreement)),
-            Some(first) => Err(Outcome::Wrong(format!("the oracle rejects {} answers, {first}", counts.unexplained))),
-        }
+        let oracle = || Cow::Borrowed(self.oracle);
+        let admitted = self.workers.install(|| truth::admit(engine, batches, scalar, &answers, oracle));
+        admitted.map(|agreement| (answers, agreement)).map_err(Outcome::Wrong)
     }
 
     fn outcome(
@@ -295,11 +282,6 @@ impl<S: Engines> Subject<'_, S> {
             prim_lane_use: lane_use(counters.prim_lanes_active, counters.prim_lanes_total),
         })
     }
-}
-
-/// The oracle's name for precision `S`.
-pub fn precision<S: Engines>() -> Precision {
-    if S::PRECISION == "f64" { Precision::F64 } else { Precision::F32 }
 }
 
 /// One tracer's place among the series with how its answers compare, or why it has none.

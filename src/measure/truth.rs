@@ -1,16 +1,18 @@
 //! Answers judged by the f64 oracle: where this floor touches `reference`.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::lanes::Real;
-use crate::measure::agreement::Agreement;
+use crate::measure::agreement::{Agreement, compare};
 use crate::measure::answers::Answers;
 use crate::ray::{Hits, Rays};
 use crate::reference::{EngineHit, MARGIN_FACTOR, Oracle, OracleRay, Tally, Verdict, Why};
 use crate::scene::description::Precision;
+use crate::trace::{Engine, Engines};
 
 /// A [`Tally`] in words, for tables and JSON.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -45,60 +47,73 @@ impl Counts {
     }
 }
 
-/// Margin factor (see [`crate::reference`]) for engines with an arithmetic of their own: three times the common one. Their rays
-/// and corners go through a rotation each, and edges are met a little outside so that nothing passes between them.
+/// Margin factor (see [`crate::reference`]) for engines with an arithmetic of their own: three times the common one.
+/// Their rays and corners go through a rotation each, and edges are met a little outside so that nothing passes between
+/// them.
 pub const OWN_MARGIN_FACTOR: f64 = 3.0 * MARGIN_FACTOR;
 
+/// How far the answers of `engine` may be from the oracle's.
+pub fn margin_factor<S: Engines>(engine: &dyn Engine<S>) -> f64 {
+    if engine.is_exact() { MARGIN_FACTOR } else { OWN_MARGIN_FACTOR }
+}
+
 /// Judges every `stride`-th ray of `batches`, on the current rayon pool. Dead rays are judged too: their answer must
-/// be a miss.
-pub fn judge<S: Real>(
+/// be a miss. `margin_factor`: see [`margin_factor`].
+pub fn judge<S: Engines>(
     oracle: &Oracle,
-    precision: Precision,
+    margin_factor: f64,
     batches: &[Rays<S>],
     answers: &Answers<S>,
     stride: usize,
 ) -> Counts {
-    let chosen = places(batches).enumerate().step_by(stride.max(1)).collect();
-    judge_these(oracle, (precision, MARGIN_FACTOR), batches, answers, chosen)
+    judge_these(oracle, margin_factor, batches, answers, places(batches).enumerate().step_by(stride.max(1)).collect())
 }
 
-/// [`judge`] for an engine with an arithmetic of its own.
-pub fn judge_own<S: Real>(
-    oracle: &Oracle,
-    precision: Precision,
+/// Whether the answers of `engine` are those of `scalar`: bit for bit, or, for an engine with an arithmetic of its own,
+/// up to rounding (the agreement is returned), where the oracle must explain each that is not. `oracle` is asked for
+/// only then.
+///
+/// # Errors
+/// The first answer that is neither, in words.
+pub fn admit<'o, S: Engines>(
+    engine: &dyn Engine<S>,
     batches: &[Rays<S>],
+    scalar: &Answers<S>,
     answers: &Answers<S>,
-    stride: usize,
-) -> Counts {
-    let chosen = places(batches).enumerate().step_by(stride.max(1)).collect();
-    judge_these(oracle, (precision, OWN_MARGIN_FACTOR), batches, answers, chosen)
-}
-
-/// Judges an engine with an arithmetic of its own where `agreement` says it is unlike `scalar`.
-pub fn judge_unlike<S: Real>(
-    oracle: &Oracle,
-    precision: Precision,
-    batches: &[Rays<S>],
-    answers: &Answers<S>,
-    agreement: &Agreement,
-) -> Counts {
+    oracle: impl FnOnce() -> Cow<'o, Oracle>,
+) -> Result<Agreement, String> {
+    if engine.is_exact() {
+        return match answers.difference(scalar) {
+            None => Ok(Agreement::default()),
+            Some(d) => Err(format!("{} rays differ from scalar, ray {}: {}", d.count, d.first, d.text)),
+        };
+    }
+    let agreement = compare(scalar, answers);
+    if agreement.unlike.is_empty() {
+        return Ok(agreement);
+    }
     let mut unlike = agreement.unlike.iter().copied().peekable();
-    let chosen = places(batches).enumerate().filter(|(n, _)| unlike.next_if_eq(&(*n as u64)).is_some());
-    judge_these(oracle, (precision, OWN_MARGIN_FACTOR), batches, answers, chosen.collect())
+    let chosen = places(batches).enumerate().filter(|(n, _)| unlike.next_if_eq(&(*n as u64)).is_some()).collect();
+    let counts = judge_these(&oracle(), OWN_MARGIN_FACTOR, batches, answers, chosen);
+    match counts.samples.first() {
+        None => Ok(agreement),
+        Some(first) => Err(format!("the oracle rejects {} answers, {first}", counts.unexplained)),
+    }
 }
 
-/// Batch and slot of every ray.
-fn places<S: Real>(batches: &[Rays<S>]) -> impl Iterator<Item = (usize, usize)> {
+/// Batch and slot of every ray, in order.
+pub(super) fn places<S: Real>(batches: &[Rays<S>]) -> impl Iterator<Item = (usize, usize)> {
     batches.iter().enumerate().flat_map(|(b, rays)| (0..rays.len()).map(move |i| (b, i)))
 }
 
-fn judge_these<S: Real>(
+fn judge_these<S: Engines>(
     oracle: &Oracle,
-    (precision, factor): (Precision, f64),
+    factor: f64,
     batches: &[Rays<S>],
     answers: &Answers<S>,
     chosen: Vec<(usize, (usize, usize))>,
 ) -> Counts {
+    let precision = if S::PRECISION == "f64" { Precision::F64 } else { Precision::F32 };
     let judge_one = |(number, (b, i)): (usize, (usize, usize))| {
         let ray = oracle_ray(&batches[b], i);
         let (hit, verdict) = match answers {
@@ -167,7 +182,7 @@ mod tests {
             (hits[b].t[i], hits[b].prim[i], hits[b].inst[i]) = (t, 0, 0);
         }
         let count = |hits: &[Hits<f32>], stride| {
-            judge(&oracle, Precision::F32, &batches, &Answers::Closest(hits.to_vec()), stride)
+            judge(&oracle, MARGIN_FACTOR, &batches, &Answers::Closest(hits.to_vec()), stride)
         };
         let right = count(&hits, 1);
         assert_eq!((right.agree, right.unexplained, right.total()), (3, 0, 3), "{right:?}");
@@ -177,6 +192,6 @@ mod tests {
         assert!(wrong.samples[0].starts_with("ray 2: "), "{wrong:?}");
         assert_eq!(count(&hits, 2).total(), 2, "every second ray");
         let none = Answers::new(Query::Any, &batches);
-        assert_eq!(judge(&oracle, Precision::F32, &batches, &none, 1).unexplained, 3);
+        assert_eq!(judge(&oracle, MARGIN_FACTOR, &batches, &none, 1).unexplained, 3);
     }
 }

@@ -3,13 +3,12 @@
 
 use crate::error::{Error, Result};
 use crate::measure::answers::Answers;
-use crate::measure::bench::precision;
 use crate::measure::eye::{Framing, View};
 use crate::measure::raysets::{Query, RayKind, convert};
 use crate::measure::timing::Workers;
 use crate::measure::truth::{self, Counts};
 use crate::ray::Rays;
-use crate::reference::Oracle;
+use crate::reference::{MARGIN_FACTOR, Oracle};
 use crate::scene::description::Description;
 use crate::scene::world::{Preset, World};
 use crate::trace::{Engine, Engines, engine};
@@ -124,7 +123,7 @@ impl<S: Engines> Bench<'_, S> {
         report: &mut dyn FnMut(Line),
     ) -> Result<()> {
         let scalar = self.answers(engine::<S>("scalar")?, query, batches);
-        let judged = self.judge(batches, &scalar);
+        let judged = self.judge(MARGIN_FACTOR, batches, &scalar);
         let rays: u64 = batches.iter().map(|b| b.len() as u64).sum();
         let shuffled = Shuffled::new(batches);
         for &engine in S::engines() {
@@ -154,10 +153,9 @@ impl<S: Engines> Bench<'_, S> {
             let difference = answers.difference(&scalar);
             line.hits = answers.hit_count();
             // The same bits get the same verdicts; only an engine that differs is judged anew.
-            line.oracle = match (&difference, engine.is_exact()) {
-                (None, _) => judged.clone(),
-                (Some(_), true) => self.judge(batches, &answers),
-                (Some(_), false) => self.judge_own(batches, &answers),
+            line.oracle = match difference {
+                None => judged.clone(),
+                Some(_) => self.judge(truth::margin_factor(engine), batches, &answers),
             };
             if engine.is_exact() {
                 line.bit_differences = difference.as_ref().map_or(0, |d| d.count);
@@ -183,16 +181,11 @@ impl<S: Engines> Bench<'_, S> {
         let reversed: Vec<Rays<S>> = batches.iter().rev().cloned().collect();
         let again = self.answers(engine, query, &reversed);
         let last = batches.len().saturating_sub(1);
-        let places = batches.iter().enumerate().flat_map(|(b, rays)| (0..rays.len()).map(move |i| (b, i)));
-        places.filter(|&(b, i)| !answers.same_as(b, i, &again, last - b, i)).count() as u64
+        truth::places(batches).filter(|&(b, i)| !answers.same_as(b, i, &again, last - b, i)).count() as u64
     }
 
-    fn judge(&self, batches: &[Rays<S>], answers: &Answers<S>) -> Counts {
-        self.workers.install(|| truth::judge(self.oracle, precision::<S>(), batches, answers, 1))
-    }
-
-    fn judge_own(&self, batches: &[Rays<S>], answers: &Answers<S>) -> Counts {
-        self.workers.install(|| truth::judge_own(self.oracle, precision::<S>(), batches, answers, 1))
+    fn judge(&self, margin_factor: f64, batches: &[Rays<S>], answers: &Answers<S>) -> Counts {
+        self.workers.install(|| truth::judge(self.oracle, margin_factor, batches, answers, 1))
     }
 }
 
@@ -207,8 +200,7 @@ impl<S: Engines> Shuffled<S> {
     const BATCH: usize = 37;
 
     fn new(batches: &[Rays<S>]) -> Self {
-        let places: Vec<_> =
-            batches.iter().enumerate().flat_map(|(b, rays)| (0..rays.len()).map(move |i| (b, i))).collect();
+        let places: Vec<_> = truth::places(batches).collect();
         // Steps of a stride without a common factor with the length visit every place once, far apart.
         let count = places.len();
         let stride = (count * 5 / 8..).find(|&s| gcd(s, count) == 1).unwrap_or(1);

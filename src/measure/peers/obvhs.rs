@@ -97,49 +97,35 @@ trait Traverse: Send + Sync + 'static {
     fn misses(&self, ray: Ray, triangles: &[RtTriangle]) -> bool;
 }
 
-impl Traverse for Bvh2 {
-    const WHAT: &'static str = "BVH2";
+/// Both trees have these methods, but the crate has no trait for them.
+macro_rules! traverse {
+    ($tree:ty, $what:literal) => {
+        impl Traverse for $tree {
+            const WHAT: &'static str = $what;
 
-    fn order(&self) -> &[u32] {
-        &self.primitive_indices
-    }
+            fn order(&self) -> &[u32] {
+                &self.primitive_indices
+            }
 
-    fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..])
-    }
+            fn bytes(&self) -> usize {
+                size_of_val(&self.nodes[..])
+            }
 
-    fn closest(&self, ray: Ray, triangles: &[RtTriangle]) -> RayHit {
-        let mut hit = RayHit::none();
-        self.ray_traverse(ray, &mut hit, |ray, slot| triangles[slot].intersect(ray));
-        hit
-    }
+            fn closest(&self, ray: Ray, triangles: &[RtTriangle]) -> RayHit {
+                let mut hit = RayHit::none();
+                self.ray_traverse(ray, &mut hit, |ray, slot| triangles[slot].intersect(ray));
+                hit
+            }
 
-    fn misses(&self, ray: Ray, triangles: &[RtTriangle]) -> bool {
-        self.ray_traverse_miss(ray, |ray, slot| triangles[slot].intersect(ray))
-    }
+            fn misses(&self, ray: Ray, triangles: &[RtTriangle]) -> bool {
+                self.ray_traverse_miss(ray, |ray, slot| triangles[slot].intersect(ray))
+            }
+        }
+    };
 }
 
-impl Traverse for CwBvh {
-    const WHAT: &'static str = "CWBVH";
-
-    fn order(&self) -> &[u32] {
-        &self.primitive_indices
-    }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..])
-    }
-
-    fn closest(&self, ray: Ray, triangles: &[RtTriangle]) -> RayHit {
-        let mut hit = RayHit::none();
-        self.ray_traverse(ray, &mut hit, |ray, slot| triangles[slot].intersect(ray));
-        hit
-    }
-
-    fn misses(&self, ray: Ray, triangles: &[RtTriangle]) -> bool {
-        self.ray_traverse_miss(ray, |ray, slot| triangles[slot].intersect(ray))
-    }
-}
+traverse!(Bvh2, "BVH2");
+traverse!(CwBvh, "CWBVH");
 
 struct Obvhs<T> {
     facts: Facts,
