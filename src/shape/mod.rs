@@ -27,7 +27,7 @@ pub use half_space::HalfSpace;
 pub use placed::{Placed, PlacedRecord};
 pub use span::{Solid, Span};
 pub use sphere::{Sphere, SphereRecord, WorldSphere};
-pub use triangle::{Degenerate, Triangle, TriangleBlock};
+pub use triangle::{Degenerate, Triangle, TriangleBlock, Turned, around};
 
 #[cfg(test)]
 mod tests;
