@@ -1,5 +1,7 @@
 //! `lanecast trace`: a file of rays through one engine, checked, timed, hits written.
 
+mod stretches;
+
 use std::borrow::Cow;
 use std::path::PathBuf;
 
@@ -25,6 +27,7 @@ use crate::trace::{Engine, Engines, engine};
 const EXAMPLES: &str = "\
 Examples:
   lanecast trace model.ply --rays primary.npy
+  lanecast trace bolt.kdl --rays primary.npy --query all --hits inside.npy
   lanecast trace model.ply --rays ao.npy --query any --engine scalar --threads 1 --json
   lanecast trace model.ply --rays primary.npy --hits hits.npy --repeat 1
 
@@ -41,9 +44,9 @@ pub struct TraceArgs {
     /// File of rays
     #[arg(long, value_name = "FILE.npy")]
     rays: PathBuf,
-    /// What to ask: closest or any
+    /// What to ask: closest, any, or all (every stretch inside a solid)
     #[arg(long, default_value = "closest")]
-    query: Query,
+    query: Asked,
     #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
@@ -51,11 +54,34 @@ pub struct TraceArgs {
     /// Timed passes
     #[arg(long, value_name = "R", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     repeat: u32,
-    /// Write the hits: t u v prim inst per ray, or one byte per ray for --query any
+    /// Write the hits: t u v prim inst per ray, or one byte per ray for --query any; for --query all
+    /// t_in t_out ray inst prim_in prim_out per stretch of a ray inside a solid
     #[arg(long, value_name = "FILE.npy")]
     hits: Option<PathBuf>,
     #[command(flatten)]
     pub(super) output: OutputArgs,
+}
+
+/// What is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asked {
+    /// The nearest hit, or whether there is one.
+    Hits(Query),
+    /// All stretches inside solids.
+    All,
+}
+
+impl std::str::FromStr for Asked {
+    type Err = Error;
+
+    fn from_str(word: &str) -> Result<Self> {
+        match word {
+            "all" => Ok(Self::All),
+            _ => word.parse().map(Self::Hits).map_err(|_: Error| {
+                Error::Usage(format!("unknown query `{word}`; the queries are closest, any and all"))
+            }),
+        }
+    }
 }
 
 /// The object of `--json`.
@@ -104,18 +130,20 @@ struct Bytes {
 pub fn run(args: &TraceArgs) -> Result<()> {
     let description = args.scene.load()?;
     let rays = npy::read_rays(&args.rays)?;
-    match args.scene.options.precision(&description) {
-        Precision::F32 => trace::<f32>(args, &description, &rays),
-        Precision::F64 => trace::<f64>(args, &description, &rays),
+    match (args.query, args.scene.options.precision(&description)) {
+        (Asked::Hits(query), Precision::F32) => trace::<f32>(args, query, &description, &rays),
+        (Asked::Hits(query), Precision::F64) => trace::<f64>(args, query, &description, &rays),
+        (Asked::All, Precision::F32) => stretches::run::<f32>(args, &description, &rays),
+        (Asked::All, Precision::F64) => stretches::run::<f64>(args, &description, &rays),
     }
 }
 
-fn trace<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f32>) -> Result<()> {
+fn trace<S: Engines>(args: &TraceArgs, query: Query, description: &Description, rays: &Rays<f32>) -> Result<()> {
     let engine = args.engine.find::<S>()?;
     let workers = Workers::new(args.threads.count())?;
     let world = workers.install(|| World::<S>::compile(description, args.scene.options.preset()))?;
     let batches = split::<S>(rays);
-    let answers = checked(&workers, engine, &world, &batches, args.query)?;
+    let answers = checked(&workers, engine, &world, &batches, query)?;
 
     let mut series = [Series::new(Tracer::Engine(engine), answers)];
     interleave(&workers, &world, &batches, &mut series, (0, args.repeat), &stopped)?;
@@ -132,7 +160,7 @@ fn trace<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f3
     let report = Report {
         scene: &args.scene.scene,
         engine: engine.name(),
-        query: args.query.name(),
+        query: query.name(),
         precision: S::PRECISION,
         isa: compiled_isa(),
         threads: workers.threads(),

@@ -116,7 +116,7 @@ impl<S: Real> Leaf<S> {
         Self { kind: Kind::Planes { first, count }, ..*self }
     }
 
-    /// Adds the boundaries of this leaf in `lanes` to `events`, moved into the interval of its box.
+    /// Adds the boundaries of this leaf in `lanes` to `events`; `within`: where the lines meet its box, give or take.
     #[inline(always)]
     pub fn boundaries<V: Lanes<Scalar = S>>(
         &self,

@@ -42,6 +42,11 @@ impl<S: Real> Solid<S> {
         self.numbers[leaf as usize]
     }
 
+    /// Whether it is everything but a part of space: inside where no leaf is met.
+    pub fn reaches_everywhere(&self) -> bool {
+        self.tree.nodes[0].default
+    }
+
     /// Number of leaves.
     pub fn leaf_count(&self) -> usize {
         self.leaves.len()
@@ -120,7 +125,7 @@ impl<S: Real> Solid<S> {
         }
     }
 
-    /// Adds the boundaries of a leaf, unless it lies beyond `limit` in all lanes.
+    /// Adds the boundaries of a leaf, unless it lies beyond `limit` in all lanes. `slack`: twice the tolerance.
     #[inline(always)]
     pub(super) fn boundaries<V: Lanes<Scalar = S>>(
         &self,
@@ -128,11 +133,14 @@ impl<S: Real> Solid<S> {
         met: &Met,
         slot: u32,
         limit: V,
+        slack: V,
         events: &mut Events<S>,
     ) {
         let leaf = &self.leaves[met.leaf as usize];
         let within = Interval::of(packet, leaf.clip.lo, leaf.clip.hi);
-        if within.near.cmp_le(limit).bits() & met.lanes != 0 {
+        let within = Interval { near: within.near - slack, far: within.far + slack };
+        // Groups of boundaries that begin before the limit end less than `slack` after it.
+        if within.near.cmp_le(limit + slack).bits() & met.lanes != 0 {
             leaf.boundaries(packet, &within, &self.planes, (slot, met.lanes), events);
         }
     }

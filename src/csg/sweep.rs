@@ -92,10 +92,16 @@ impl<S: Real> Events<S> {
         self.leaf.push(leaf);
     }
 
-    /// Adds both boundaries of a span, moved into the interval of the leaf's box, in the lanes of `lanes`.
+    /// Adds both boundaries of a span in the lanes of `lanes`. Those that lie outside of the leaf's box, by more than rounding,
+    /// go to infinity: there the leaf makes no difference, and a boundary must not count where it is not.
     #[inline(always)]
     pub fn push_span<V: Lanes<Scalar = S>>(&mut self, leaf: u32, lanes: u32, span: &Span<V>, within: &Interval<V>) {
-        let (t_in, t_out) = (within.clamp(span.t_in), within.clamp(span.t_out));
+        let (before, after) = (-V::splat(S::INFINITY), V::splat(S::INFINITY));
+        let settled = |t: V| {
+            let t = V::select(t.cmp_lt(within.near), before, t);
+            V::select(within.far.cmp_lt(t), after, t)
+        };
+        let (t_in, t_out) = (settled(span.t_in), settled(span.t_out));
         // Both or none; NaN is none.
         let both = span.hit & t_in.cmp_le(t_out) & V::Mask::from_bits(lanes);
         if both.any() {
@@ -139,7 +145,7 @@ pub fn sweep<V: Lanes>(
     let mut pending = 0;
     for (slot, m) in met.iter().enumerate() {
         pending |= m.lanes;
-        solid.boundaries(packet, m, slot as u32, limit + (eps + eps), events);
+        solid.boundaries(packet, m, slot as u32, limit, eps + eps, events);
     }
     effort.events = events.count;
     pending &= lanes;
