@@ -1,6 +1,7 @@
 //! A compiled solid: leaves, operations, bounds, and a tree over the leaves' boxes where there are many.
 
-use super::leaf::{Leaf, PlaneList};
+use super::leaf::{Leaf, Stores};
+use super::mesh::Crossings;
 use super::prune::Met;
 use super::sweep::Events;
 use super::tree::Tree;
@@ -22,7 +23,7 @@ pub struct Solid<S> {
     pub(super) leaves: Vec<Leaf<S>>,
     /// Numbers of the leaves in the program it was compiled from.
     pub(super) numbers: Vec<u32>,
-    pub(super) planes: PlaneList<S>,
+    pub(super) stores: Stores<S>,
     /// Outside of this box there is nothing; infinite where a complement reaches everywhere.
     pub bounds: Aabb<S>,
     /// Largest coordinate of the bounded leaves' boxes.
@@ -57,8 +58,8 @@ impl<S: Real> Solid<S> {
         let (tree, blocks) = self.search.as_ref().map_or((0, 0), |(tree, blocks)| {
             (size_of_val(&tree.nodes[..]), blocks.iter().map(|b| size_of_val(&b[..])).sum())
         });
-        let own = size_of_val(&self.leaves[..]) + size_of_val(&self.planes[..]) + size_of_val(&self.numbers[..]);
-        own + self.tree.bytes() + tree + blocks
+        let own = size_of_val(&self.leaves[..]) + size_of_val(&self.stores.planes[..]) + size_of_val(&self.numbers[..]);
+        own + self.stores.meshes.iter().map(|m| m.bytes()).sum::<usize>() + self.tree.bytes() + tree + blocks
     }
 
     /// Difference of t below which two boundaries of a lane are one. It depends on the lane's line only.
@@ -125,7 +126,7 @@ impl<S: Real> Solid<S> {
         }
     }
 
-    /// Adds the boundaries of a leaf, unless it lies beyond `limit` in all lanes. `slack`: twice the tolerance.
+    /// Adds the boundaries of a leaf, unless it lies beyond `limit` in all lanes. `eps`: the tolerance.
     #[inline(always)]
     pub(super) fn boundaries<V: Lanes<Scalar = S>>(
         &self,
@@ -133,15 +134,17 @@ impl<S: Real> Solid<S> {
         met: &Met,
         slot: u32,
         limit: V,
-        slack: V,
+        eps: V,
         events: &mut Events<S>,
+        crossings: &mut Crossings,
     ) {
+        let slack = eps + eps;
         let leaf = &self.leaves[met.leaf as usize];
         let within = Interval::of(packet, leaf.clip.lo, leaf.clip.hi);
         let within = Interval { near: within.near - slack, far: within.far + slack };
         // Groups of boundaries that begin before the limit end less than `slack` after it.
         if within.near.cmp_le(limit + slack).bits() & met.lanes != 0 {
-            leaf.boundaries(packet, &within, &self.planes, (slot, met.lanes), events);
+            leaf.boundaries(packet, &within, (&self.stores, eps), (slot, met.lanes), (events, crossings));
         }
     }
 }

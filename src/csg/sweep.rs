@@ -6,6 +6,7 @@
 //! alone. Sources: Roth, "Ray casting for modeling solids", 1982 (boundaries per line); Lefebvre, "IceSL: A GPU
 //! accelerated CSG modeler and slicer", 2013 (sweep over sorted boundaries with early end).
 
+use super::mesh::Crossings;
 use super::prune::{Met, Program, Pruner};
 use super::solid::Solid;
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
@@ -23,6 +24,7 @@ pub struct Scratch<S> {
     inside: Vec<u32>,
     toggled: Vec<Toggled>,
     stack: Vec<(u32, u32)>,
+    crossings: Crossings,
 }
 
 /// Boundaries of leaves: `MAX_LANES` numbers each.
@@ -130,7 +132,7 @@ pub fn sweep<V: Lanes>(
     let mut effort = Effort::default();
     let eps = solid.tolerance(packet);
     let limit = limit.fast_min(V::splat(V::Scalar::MAX));
-    let Scratch { met, pruner, program, events, inside, toggled, stack } = scratch;
+    let Scratch { met, pruner, program, events, inside, toggled, stack, crossings } = scratch;
     solid.meet(packet, lanes, eps, met, stack);
     effort.met = met.len();
     pruner.prune(&solid.tree, met, program);
@@ -145,7 +147,7 @@ pub fn sweep<V: Lanes>(
     let mut pending = 0;
     for (slot, m) in met.iter().enumerate() {
         pending |= m.lanes;
-        solid.boundaries(packet, m, slot as u32, limit, eps + eps, events);
+        solid.boundaries(packet, m, slot as u32, limit, eps, events, crossings);
     }
     effort.events = events.count;
     pending &= lanes;

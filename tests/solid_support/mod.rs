@@ -7,6 +7,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use lanecast::lanes::Real;
 use lanecast::ray::Rays;
 use lanecast::scene::description::{Description, Item, ItemKind, Shape};
+use lanecast::scene::mesh::Mesh;
 use lanecast::scene::solids::{self, NodeId, NodeKind, Placed, Polyhedron, Solid, SolidNode, SolidTree};
 
 use crate::common::Random;
@@ -34,6 +35,14 @@ pub fn cuboid(lo: DVec3, hi: DVec3) -> Placed {
     Placed { solid: Solid::Shape(Shape::Cuboid), transform }
 }
 
+/// The cube [-1, 1]^3, two triangles a side.
+fn cube_mesh() -> Mesh {
+    let positions = (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * 2.0 - 1.0);
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    Mesh { positions: positions.collect(), triangles, groups: Vec::new() }
+}
+
 /// A leaf; `kinds` is how many of the kinds of solids may occur.
 pub fn leaf(r: &mut Random, kinds: usize) -> Placed {
     let (p, n, s) = (point(r), axis(r), length(r));
@@ -59,13 +68,18 @@ pub fn leaf(r: &mut Random, kinds: usize) -> Placed {
         11 => solids::elliptic_hyperboloid(p, n * s, a, length(r), length(r), 0.5),
         12 => solids::parabolic_cylinder(p, n * s, a * length(r), length(r)),
         13 => solids::hyperbolic_cylinder(p, n * s, a * length(r), length(r), 0.5),
-        _ => solids::truncated_cone(p, n * s + a * 0.5, a * s, b, a * 0.5, b * length(r)),
+        14 => solids::truncated_cone(p, n * s + a * 0.5, a * s, b, a * 0.5, b * length(r)),
+        _ => {
+            let mesh = if r.below(2) == 0 { crate::common::ball(6, 8) } else { cube_mesh() };
+            let transform = DAffine3::from_scale_rotation_translation(DVec3::splat(s), DQuat::IDENTITY, p);
+            Ok(Placed { solid: Solid::Mesh(Arc::new(mesh)), transform })
+        }
     };
     placed.expect("a solid with sound numbers")
 }
 
 /// All kinds of [`leaf`].
-pub const KINDS: usize = 15;
+pub const KINDS: usize = 16;
 
 /// Adds a random subtree of at most `depth` levels of operations.
 pub fn grow(tree: &mut SolidTree, r: &mut Random, depth: usize, kinds: usize) -> NodeId {

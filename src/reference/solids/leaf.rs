@@ -9,8 +9,11 @@ use glam::DVec3;
 use super::super::shapes;
 use super::super::spans::{self, Crossing, Span};
 use crate::scene::description::Shape;
+use crate::scene::mesh::Mesh;
 use crate::scene::solids::{Polyhedron, Solid};
 
+/// Crossings of a mesh closer than this relative to coordinates are one.
+const SAME_EDGE: f64 = 1e-13;
 /// Intervals shorter than this (units of the canonical solid) are looked through no further.
 const FINEST: f64 = 1e-7;
 
@@ -27,6 +30,7 @@ pub(super) fn intervals(solid: &Solid, org: DVec3, dir: DVec3) -> Vec<Span> {
         Solid::Taper { x, y } => taper([*x, *y], org, dir),
         Solid::Round { profile } => curved(*profile, false, org, dir),
         Solid::Trough { profile } => curved(*profile, true, org, dir),
+        Solid::Mesh(mesh) => meshed(mesh, org, dir),
     }
 }
 
@@ -47,7 +51,41 @@ pub(super) fn normal(solid: &Solid, face: u32, p: DVec3) -> DVec3 {
         }
         Solid::Round { profile: [_, g1, g2] } => DVec3::new(2.0 * p.x, 2.0 * p.y, -(g1 + 2.0 * g2 * p.z)),
         Solid::Trough { profile: [_, g1, g2] } => DVec3::new(0.0, 2.0 * p.y, -(g1 + 2.0 * g2 * p.z)),
+        Solid::Mesh(mesh) => {
+            let [a, b, c] = mesh.corners(face as usize);
+            shapes::cross(b - a, c - a)
+        }
     }
+}
+
+/// The inside of a closed mesh, by the number of surfaces around a point: every crossing adds or takes one, and a crossing of
+/// an edge, seen by the triangles on both its sides, counts once.
+fn meshed(mesh: &Mesh, org: DVec3, dir: DVec3) -> Vec<Span> {
+    let mut ends: Vec<(f64, bool, u32)> = Vec::new();
+    for i in 0..mesh.triangles.len() {
+        let corners = mesh.corners(i);
+        if let Some(hit) = shapes::triangle(corners, org, dir).filter(|_| shapes::is_proper(corners)) {
+            ends.push((hit.t, hit.ng.dot(dir) < 0.0, i as u32));
+        }
+    }
+    ends.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+    let size = mesh.bounds().map_or(0.0, |(lo, hi)| lo.abs().max(hi.abs()).max_element()) + org.abs().max_element();
+    let apart = SAME_EDGE * size / dir.length();
+    let mut spans: Vec<Span> = Vec::new();
+    let mut entered: Option<(f64, u32)> = None;
+    for group in ends.chunk_by(|a, b| b.0 - a.0 <= apart) {
+        let (t, _, face) = group[0];
+        let way = |enters: bool| group.iter().any(|e| e.1 == enters);
+        match (entered, way(true), way(false)) {
+            (None, true, false) => entered = Some((t, face)),
+            (Some((t_in, face_in)), false, true) => {
+                spans.push(Span::new(t_in, t, face_in, face));
+                entered = None;
+            }
+            _ => {}
+        }
+    }
+    spans
 }
 
 /// Where `n . p <= d` with `at` = n . org - d and `speed` = n . dir.

@@ -226,7 +226,7 @@ impl Leaf {
             Solid::Torus { minor } => 4.0 / minor,
             Solid::Taper { .. } => 16.0,
             Solid::Round { .. } | Solid::Trough { .. } => 4.0,
-            Solid::Shape(_) | Solid::Polyhedron(_) => 1.0,
+            Solid::Shape(_) | Solid::Polyhedron(_) | Solid::Mesh(_) => 1.0,
         };
         object.max_element() * loss
     }
