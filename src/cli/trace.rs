@@ -18,7 +18,7 @@ use crate::measure::raysets::{Query, split};
 use crate::measure::stats::{Summary, summary};
 use crate::measure::timing::{Series, Tracer, Workers, interleave};
 use crate::measure::truth;
-use crate::ray::Rays;
+use crate::ray::{Counters, Rays};
 use crate::reference::Oracle;
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
@@ -101,6 +101,37 @@ struct Report<'a> {
     build_seconds: f64,
     bytes: Bytes,
     checksum: String,
+    /// What trees of solids cost, if there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    solids: Option<SolidCounts>,
+}
+
+/// Counts of the event sweeps, each over the number of rays.
+#[derive(Serialize)]
+struct SolidCounts {
+    /// Trees of solids tested, one packet each.
+    tests_per_ray: f64,
+    /// Leaves whose boxes the packets met.
+    leaves_met_per_ray: f64,
+    /// Leaves left after pruning.
+    leaves_kept_per_ray: f64,
+    /// Boundaries of leaves, one packet each.
+    events_per_ray: f64,
+    /// Steps over them.
+    steps_per_ray: f64,
+}
+
+impl SolidCounts {
+    fn of(counters: &Counters) -> Option<Self> {
+        let per_ray = |count: u64| count as f64 / counters.rays.max(1) as f64;
+        (counters.solids > 0).then(|| Self {
+            tests_per_ray: per_ray(counters.solids),
+            leaves_met_per_ray: per_ray(counters.solid_leaves_met),
+            leaves_kept_per_ray: per_ray(counters.solid_leaves_kept),
+            events_per_ray: per_ray(counters.solid_events),
+            steps_per_ray: per_ray(counters.solid_steps),
+        })
+    }
 }
 
 #[derive(Serialize)]
@@ -176,6 +207,7 @@ fn trace<S: Engines>(args: &TraceArgs, query: Query, description: &Description, 
             total: stats.node_bytes + stats.prim_bytes,
         },
         checksum: format!("{:016x}", answers.checksum()),
+        solids: SolidCounts::of(&workers.count(engine, &world, &batches, query)),
     };
     if args.output.json { json_to_stdout(&report) } else { to_stdout(&text(&report, &seconds)) }
 }
@@ -208,13 +240,19 @@ fn mrays(rays: u64, seconds: f64) -> f64 {
 fn text(report: &Report<'_>, seconds: &Summary) -> String {
     let share = 100.0 * report.hits as f64 / (report.rays.max(1)) as f64;
     let mib = report.bytes.total as f64 / f64::from(1 << 20);
+    let solids = report.solids.as_ref().map_or(String::new(), |s| {
+        format!(
+            "solids   per ray {:.3} tests, {:.3} leaves met, {:.3} kept, {:.3} events, {:.3} steps (packets)\n",
+            s.tests_per_ray, s.leaves_met_per_ray, s.leaves_kept_per_ray, s.events_per_ray, s.steps_per_ray
+        )
+    });
     format!(
         "{} {} {} {} ({}), {} threads\n\
          rays     {}, {} hit ({share:.1} %)\n\
          speed    {:.3} Mrays/s median, {:.3} best of {} (spread {:.1} %)\n\
          pass     {:.3} ms median\n\
          build    {:.3} s, {mib:.1} MiB\n\
-         checksum {}\n",
+         {solids}checksum {}\n",
         report.scene,
         report.engine,
         report.query,

@@ -15,5 +15,5 @@ mod tree;
 pub use build::{Built, Input, build};
 pub use leaf::{Form, LeafInput, Triangles};
 pub use solid::Solid;
-pub use sweep::{Boundary, Effort, Scratch, sweep};
+pub use sweep::{Boundary, Depth, Effort, Scratch, sweep};
 pub use tree::{Op, Token};

@@ -118,14 +118,68 @@ impl<S: Real> Events<S> {
     }
 }
 
+/// How much of the lines' way through a solid is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// All of it: for who wants every boundary.
+    Whole,
+    /// The front part first, then more, as long as lanes need it: for who wants the first boundary. What was reported may
+    /// be reported again.
+    FrontFirst,
+}
+
 /// Reports the boundaries of `solid` on the packet's lines in order of t to `found`, which returns the lanes that need no
-/// more. `limit` is how far lanes look at most; `lanes` are those whose line meets the solid's box.
+/// more. `limit` is how far lanes look at most; `lanes` are those whose line meets the solid's box, in `interval`.
 #[inline(always)]
 pub fn sweep<V: Lanes>(
     solid: &Solid<V::Scalar>,
     packet: &Packet<V>,
+    (lanes, interval): (u32, &Interval<V>),
+    limit: V,
+    depth: Depth,
+    scratch: &mut Scratch<V::Scalar>,
+    mut found: impl FnMut(&Boundary<V>) -> u32,
+) -> Effort {
+    let mut effort = Effort::default();
+    let mut share = if depth == Depth::Whole { 1.0 } else { solid.front() };
+    let start = interval.near.fast_max(packet.t_min);
+    let mut lanes = lanes;
+    loop {
+        // Parts are shares of the lane's own way, so that they are the same in a packet of any width.
+        let part = (interval.far - start) * V::constant(share) + start;
+        let whole = share >= 1.0;
+        let reach = if whole { V::splat(V::Scalar::INFINITY) } else { part };
+        let mut done = 0;
+        effort += pass(solid, packet, lanes, limit.fast_min(reach), reach, scratch, |boundary| {
+            let lanes = found(boundary);
+            done |= lanes;
+            lanes
+        });
+        lanes &= !done & reach.cmp_lt(limit).bits();
+        if whole || lanes == 0 {
+            return effort;
+        }
+        share *= 4.0;
+    }
+}
+
+impl std::ops::AddAssign for Effort {
+    fn add_assign(&mut self, o: Self) {
+        self.met += o.met;
+        self.kept += o.kept;
+        self.events += o.events;
+        self.steps += o.steps;
+    }
+}
+
+/// One sweep over the leaves that begin before `reach`.
+#[inline(always)]
+fn pass<V: Lanes>(
+    solid: &Solid<V::Scalar>,
+    packet: &Packet<V>,
     lanes: u32,
     limit: V,
+    reach: V,
     scratch: &mut Scratch<V::Scalar>,
     mut found: impl FnMut(&Boundary<V>) -> u32,
 ) -> Effort {
@@ -133,7 +187,7 @@ pub fn sweep<V: Lanes>(
     let eps = solid.tolerance(packet);
     let limit = limit.fast_min(V::splat(V::Scalar::MAX));
     let Scratch { met, pruner, program, events, inside, toggled, stack, crossings } = scratch;
-    solid.meet(packet, lanes, eps, met, stack);
+    solid.meet(packet, lanes, eps, reach, met, stack);
     effort.met = met.len();
     pruner.prune(&solid.tree, met, program);
     effort.kept = met.len();

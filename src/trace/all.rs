@@ -4,7 +4,7 @@
 //! swept from end to end. Surfaces without an inside (meshes, discs) have no stretches.
 
 use super::{Engines, Scratch};
-use crate::csg;
+use crate::csg::{self, Depth};
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::slab::Interval;
 use crate::ray::{INVALID_ID, Packet, Rays};
@@ -136,7 +136,7 @@ impl<V: Lanes> Job<'_, V> {
         let endless = Open { t_in: f64::NEG_INFINITY, prim_in: INVALID_ID };
         let mut open = [placed.solid.reaches_everywhere().then_some(endless); MAX_LANES];
         let mut scratch = std::mem::take(self.solids);
-        csg::sweep(&placed.solid, packet, lanes, self.t_max, &mut scratch, |boundary| {
+        csg::sweep(&placed.solid, packet, (lanes, interval), self.t_max, Depth::Whole, &mut scratch, |boundary| {
             let t = packet.t_floor.fast_max(interval.clamp(boundary.t));
             let prim = placed.first_prim + placed.solid.number(boundary.leaf);
             let mut rest = boundary.lanes;
