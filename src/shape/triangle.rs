@@ -176,7 +176,8 @@ impl Triangle {
         let zero = V::constant(0.0);
         let flat = Self::along_a_face(packet);
         let end = V::select(interval.far.cmp_eq(zero) & flat, found.t, interval.far);
-        found.hit = found.hit & !(flat & interval.near.cmp_eq(zero) & found.t.cmp_lt(zero));
+        let behind = found.t.cmp_lt(zero) & zero.cmp_le(packet.t_min);
+        found.hit = found.hit & !(flat & interval.near.cmp_eq(zero) & behind);
         found.t = packet.t_floor.fast_max(interval.near.fast_max(found.t.fast_min(end)));
         // A parameter that overflowed is no hit: it would tie with the end of an infinite segment.
         let finite = found.t.abs().cmp_le(V::splat(V::Scalar::MAX));

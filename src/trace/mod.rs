@@ -4,12 +4,14 @@
 //! the tree), `packetN` at N lanes. Their hits are equal to the last bit; [`crate::ray::slab`] says why. `tile` has its
 //! own arithmetic, and hits that differ where rounding can tell; `tile-exact` asks the common kernel there.
 
+mod all;
 mod brute;
 mod bundle;
 mod leaf;
 mod output;
 mod query;
 mod single;
+mod solids;
 mod stream;
 mod tile;
 mod traverse;
@@ -20,6 +22,7 @@ use crate::error::{Error, Result, nearest_name};
 use crate::lanes::{Lanes, Pair, Real, f32x4, f32x8, f32x16, f64x2, f64x4, f64x8};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
+pub use all::{Stretch, stretches};
 use query::{Query, Stack};
 
 /// Per-thread working memory of engines; grows on use, reusable for any world.
