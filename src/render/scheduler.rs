@@ -164,7 +164,7 @@ impl<S: Real> Job<'_, S> {
                 return false;
             }
             let sub_pixel = match self.options.spp {
-                1 => SubPixel::Centre,
+                1 => SubPixel::Anchor,
                 _ => SubPixel::Sample { sample, seed: self.options.seed },
             };
             fill_tile(self.camera, &self.tiling, tile, self.rect, sub_pixel, &mut memory.rays);

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use crate::error::{Error, Place, Result};
-use crate::scene::text::{error_at, is_blank, shown};
+use crate::scene::text::{error_at, is_blank, is_newline, shown};
 
 /// One line without its end.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +50,11 @@ impl<'a> Lines<'a> {
         self.at = end;
         self.number += 1;
         Some(line)
+    }
+
+    /// Where the next line begins.
+    pub fn position(&self) -> usize {
+        self.at
     }
 
     /// The next line if it begins with `first`; else it stays.
@@ -97,13 +102,18 @@ pub(super) struct Fields<'a> {
 }
 
 impl<'a> Fields<'a> {
+    /// The fields between two bytes; ends of lines separate them too.
+    pub fn new(file: &'a Path, bytes: &'a [u8], at: usize, end: usize) -> Self {
+        Self { file, bytes, at, end }
+    }
+
     /// The next field and where it begins.
     pub fn next(&mut self) -> Option<(usize, &'a [u8])> {
-        while self.at < self.end && is_blank(self.bytes[self.at]) {
+        while self.at < self.end && is_space(self.bytes[self.at]) {
             self.at += 1;
         }
         let start = self.at;
-        while self.at < self.end && !is_blank(self.bytes[self.at]) {
+        while self.at < self.end && !is_space(self.bytes[self.at]) {
             self.at += 1;
         }
         (self.at > start).then(|| (start, &self.bytes[start..self.at]))
@@ -150,6 +160,10 @@ impl<'a> Fields<'a> {
     pub fn vector(&mut self, what: &str) -> Result<DVec3> {
         Ok(DVec3::new(self.number(what)?, self.number(what)?, self.number(what)?))
     }
+}
+
+fn is_space(byte: u8) -> bool {
+    is_blank(byte) || is_newline(byte)
 }
 
 #[cfg(test)]

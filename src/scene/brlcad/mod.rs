@@ -21,6 +21,7 @@ pub mod shader;
 mod solid;
 mod tcl;
 mod tops;
+pub mod view;
 
 use std::path::Path;
 
