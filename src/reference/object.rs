@@ -67,6 +67,7 @@ impl Object {
                     }
                 }
                 PartKind::Shape(shape) => object.push_solid(*shape, part.to_object),
+                PartKind::Solids(tree) => object.prims.extend(tree.leaves.iter().map(|_| Prim::Dropped)),
             }
         }
         let count = object.prims.len() as u32;

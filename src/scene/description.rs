@@ -10,6 +10,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::mesh::Mesh;
+use super::solids::SolidTree;
 
 /// Index into [`Description::groups`].
 pub type GroupId = u32;
@@ -29,6 +30,8 @@ pub struct Description {
     pub groups: Vec<Group>,
     /// Meshes referenced by items.
     pub meshes: Vec<Arc<Mesh>>,
+    /// Trees of solids that items place.
+    pub solids: Vec<Arc<SolidTree>>,
     /// Materials; index 0 is the default material.
     pub materials: Vec<Material>,
     /// Lights; empty means the renderer adds a default light from the camera's side.
@@ -81,6 +84,8 @@ pub enum ItemKind {
     Shape(Shape),
     /// A mesh: index into [`Description::meshes`].
     Mesh(u32),
+    /// A tree of solids: index into [`Description::solids`].
+    Solids(u32),
     /// An instance of a group: geometry is shared, not copied.
     Instance(GroupId),
 }
@@ -182,6 +187,7 @@ impl Description {
             hash: String::new(),
             groups: vec![Group::default()],
             meshes: Vec::new(),
+            solids: Vec::new(),
             materials: vec![Material::default()],
             lights: Vec::new(),
             cameras: Vec::new(),

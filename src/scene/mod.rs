@@ -12,6 +12,7 @@ pub mod mesh;
 pub mod obj;
 pub mod ply;
 pub mod reference;
+pub mod solids;
 pub mod stl;
 mod text;
 pub mod unpack;

@@ -9,6 +9,7 @@ mod bundle;
 mod leaf;
 mod query;
 mod single;
+mod solids;
 mod tile;
 mod traverse;
 

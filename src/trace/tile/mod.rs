@@ -89,6 +89,7 @@ fn mesh(world: &World<f32>) -> Option<&Object<f32>> {
     }
     let object = &world.objects[world.instances[0].object as usize];
     let others = object.spheres.len() + object.unbounded.len() + object.placed.iter().map(Vec::len).sum::<usize>();
+    let others = others + object.solids.len();
     // Triangles are numbered by block and place in 32 bits.
     let fits = object.triangles.len() < (u32::MAX / 8) as usize;
     (others == 0 && fits && matches!(Class::ALL[0], Class::Triangle)).then_some(object)
