@@ -8,10 +8,9 @@ use serde::Serialize;
 
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
 use super::output::json_to_stdout;
-use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::film::exr::{Compression, ImageInfo};
-use crate::film::{Film, Window, exr, npy, png};
+use crate::film::{Film, Window, exr, npy, pix, png};
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
 use crate::render::{Aov, Progress, RenderOptions, RenderOutput, render};
@@ -30,9 +29,12 @@ Examples:
   lanecast render model.ply -o ao.png --integrator ao --ao-samples 64 --exposure 0.5
   lanecast render scene.kdl -o cut.exr --size 1920x1080 --crop 100,100,400,300 --camera side
   lanecast render model.obj -o near.png --eye 0,1,5 --look-at 0,1,0 --fov 35
+  lanecast render moss.asc --top all.g --view moss.rt --size 512x512 -o moss.pix
+  lanecast render m35.asc --az 90 --el 0 --lenient -o front.png
 
 The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as
-float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy). Ctrl-C writes the finished tiles and exits with 130.";
+float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy), .pix (BRL-CAD's: linear, 8 bits,
+no header). Ctrl-C writes the finished tiles and exits with 130.";
 
 /// Arguments of `lanecast render`.
 #[derive(Debug, clap::Args)]
@@ -40,7 +42,7 @@ float, shape (height, width, 4); each further plane in a file beside it, NAME.PL
 pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// File to write: .exr, .png or .npy
+    /// File to write: .exr, .png, .npy or .pix
     #[arg(short = 'o', long = "output", value_name = "FILE", value_parser = target)]
     file: Target,
     #[command(flatten)]
@@ -69,7 +71,7 @@ pub struct RenderArgs {
     /// Extra planes: Z, N, albedo, id.instance, id.primitive, cost.nodes, or all
     #[arg(long, value_name = "LIST", default_value = "")]
     aov: String,
-    /// Brightness of PNG files: colours times 2^STOPS
+    /// Brightness of PNG and .pix files: colours times 2^STOPS
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     exposure: f32,
     #[command(flatten)]
@@ -89,6 +91,7 @@ enum Format {
     Exr,
     Png,
     Npy,
+    Pix,
 }
 
 /// A file to write and its format.
@@ -177,7 +180,7 @@ impl RenderArgs {
 /// tiles have been written.
 pub fn run(args: &RenderArgs) -> Result<()> {
     let options = options(args)?;
-    let description = args.scene.load()?;
+    let description = load(args)?;
     for warning in &description.warnings {
         args.output.say(&format!("warning: {warning}"));
     }
@@ -185,6 +188,15 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         Precision::F32 => picture::<f32>(args, &description, &options),
         Precision::F64 => picture::<f64>(args, &description, &options),
     })
+}
+
+/// The scene; of a database the objects that the view script names, unless `--top` names some.
+fn load(args: &RenderArgs) -> Result<Description> {
+    let mut scene = args.scene.clone();
+    if scene.options.top.is_empty() && !scene.scene.starts_with("builtin:") {
+        scene.options.top = args.camera.script()?.map(|view| view.tops).unwrap_or_default();
+    }
+    scene.load()
 }
 
 /// The options, checked before a long build starts.
@@ -206,8 +218,8 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         count: args.output.verbose > 0,
     };
     options.check()?;
-    if args.file.format == Format::Png && !options.aovs.is_empty() {
-        return Err(Error::Usage("PNG holds colours only: --aov needs .exr or .npy".into()));
+    if matches!(args.file.format, Format::Png | Format::Pix) && !options.aovs.is_empty() {
+        return Err(Error::Usage("PNG and .pix hold colours only: --aov needs .exr or .npy".into()));
     }
     Ok(options)
 }
@@ -216,8 +228,7 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
     let engine = args.engine.find::<S>()?;
     let world = World::<S>::compile(description, args.scene.options.preset())?;
     let (width, height) = (options.width, options.height);
-    let camera = args.camera.choose(description, world.bounds(), (width, height))?;
-    let camera = Camera::new(&camera, f64::from(width) / f64::from(height))?;
+    let camera = args.camera.ready(description, world.bounds(), (width, height))?;
     let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
     let output = render(&world, description, &camera, options, &watch)?;
     watch.bar.finish_and_clear();
@@ -312,6 +323,7 @@ fn write(target: &Target, film: &Film, info: &ImageInfo, exposure: f32) -> Resul
         Format::Exr => exr::write(&target.path, film, info, Compression::default()),
         Format::Png => png::write(&target.path, film, exposure),
         Format::Npy => write_npy(&target.path, film),
+        Format::Pix => pix::write(&target.path, film, exposure),
     }
 }
 
@@ -338,7 +350,8 @@ fn target(text: &str) -> std::result::Result<Target, String> {
         Some("exr") => Format::Exr,
         Some("png") => Format::Png,
         Some("npy") => Format::Npy,
-        _ => return Err("expected a file name that ends in .exr, .png or .npy".into()),
+        Some("pix") => Format::Pix,
+        _ => return Err("expected a file name that ends in .exr, .png, .npy or .pix".into()),
     };
     Ok(Target { path, format })
 }

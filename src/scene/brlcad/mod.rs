@@ -8,12 +8,15 @@
 //! below 256 bytes per byte of the file while reading; a walk ends with an error at [`regions::MAX_LEAVES`].
 
 mod boolean;
+pub mod describe;
 mod lines;
+mod lower;
 mod matrix;
 mod model;
 mod new_solids;
 mod old_solids;
 mod opening;
+mod pipe;
 mod records;
 pub mod regions;
 mod script;

@@ -189,6 +189,17 @@ impl Solid {
         }
     }
 
+    /// What BRL-CAD calls the centre of the solid; `None` for a half-space and for kinds that make no lights.
+    pub fn centre(&self) -> Option<DVec3> {
+        match self {
+            Self::Arb { points } => Some(points.iter().sum::<DVec3>() / 8.0),
+            Self::Ell { v, .. } | Self::Tor { v, .. } | Self::Eto { v, .. } => Some(*v),
+            Self::Tgc { v, h, .. } => Some(*v + *h * 0.5),
+            Self::Part { v, h, .. } => Some(*v + *h * 0.5),
+            _ => None,
+        }
+    }
+
     /// The eight corners of an arb of `count` = 4 to 8 given ones: corners beyond them coincide with others, so that
     /// [`ARB_FACES`] describes all five kinds.
     pub(super) fn arb(given: &[DVec3]) -> Option<Self> {

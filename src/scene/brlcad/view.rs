@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::lines::{Fields, Lines};
 use crate::error::Result;
+use crate::scene::description::{CameraDescription, Projection};
 use crate::scene::text::shown;
 
 /// How far from a rotation a matrix may be: scripts have ten digits, old ones six.
@@ -59,6 +60,16 @@ impl View {
         let size = if size > 0.0 && size.is_finite() { size } else { 1.0 };
         let eye = (lo + hi) * 0.5 + axes[2] * (BACK_OFF * size * 0.5);
         Self { size, eye, axes, perspective: None, tops: Vec::new() }
+    }
+
+    /// The view as a camera called `name` for pictures of `aspect` = width / height with square pixels.
+    pub fn camera(&self, name: &str, aspect: f64) -> CameraDescription {
+        let [_, up, n] = self.axes;
+        let projection = match self.perspective {
+            Some(angle) => Projection::Perspective { theta: 2.0 * ((angle * 0.5).tan() / aspect).atan() },
+            None => Projection::Parallel { height: self.size / aspect },
+        };
+        CameraDescription { name: name.into(), eye: self.eye, look_at: self.eye - n * self.size, up, projection }
     }
 }
 
