@@ -16,11 +16,14 @@ use crate::measure::env::REVISION;
 use crate::render::{Aov, Progress, RenderOptions, RenderOutput, render};
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
-use crate::shade::Integrator;
+use crate::shade::{Integrator, unknown_shaders};
 use crate::trace::Engines;
 
 /// Picture size unless `--size` says otherwise.
 const DEFAULT_SIZE: (u32, u32) = (960, 540);
+
+/// The same with `--rt-compat`.
+const RT_SIZE: (u32, u32) = (512, 512);
 
 const EXAMPLES: &str = "\
 Examples:
@@ -29,7 +32,7 @@ Examples:
   lanecast render model.ply -o ao.png --integrator ao --ao-samples 64 --exposure 0.5
   lanecast render scene.kdl -o cut.exr --size 1920x1080 --crop 100,100,400,300 --camera side
   lanecast render model.obj -o near.png --eye 0,1,5 --look-at 0,1,0 --fov 35
-  lanecast render moss.asc --top all.g --view moss.rt --size 512x512 -o moss.pix
+  lanecast render moss.asc --top all.g --view moss.rt --rt-compat --size 512x512 -o moss.pix
   lanecast render m35.asc --az 90 --el 0 --lenient -o front.png
 
 The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as
@@ -50,9 +53,12 @@ pub struct RenderArgs {
     /// Part of the picture to render, pixels, y down, half open
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = crop, help_heading = "Camera")]
     crop: Option<Window>,
-    /// What to show: whitted, ao, normals, depth or cost
+    /// What to show: whitted, ao, normals, depth, cost or rt (as --rt-compat)
     #[arg(long, value_name = "NAME", default_value = Integrator::Whitted.name())]
     integrator: Integrator,
+    /// Show a BRL-CAD database as BRL-CAD's own `rt -B -J0` does: its shaders, lights, default view and 512x512 pixels
+    #[arg(long)]
+    rt_compat: bool,
     /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 1)]
     spp: u32,
@@ -158,6 +164,7 @@ impl RenderArgs {
             camera,
             crop: None,
             integrator: Integrator::Whitted,
+            rt_compat: false,
             spp: 1,
             seed: 0,
             depth: 4,
@@ -184,6 +191,9 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     for warning in &description.warnings {
         args.output.say(&format!("warning: {warning}"));
     }
+    if options.integrator == Integrator::Rt {
+        check_rt(args, &description)?;
+    }
     with_pool(args.threads.count(), || match args.scene.options.precision(&description) {
         Precision::F32 => picture::<f32>(args, &description, &options),
         Precision::F64 => picture::<f64>(args, &description, &options),
@@ -199,16 +209,33 @@ fn load(args: &RenderArgs) -> Result<Description> {
     scene.load()
 }
 
+/// Whether `rt`'s lighting model knows all that the scene asks of it.
+fn check_rt(args: &RenderArgs, description: &Description) -> Result<()> {
+    let Some(looks) = &description.looks else {
+        return Err(Error::Usage(
+            "--rt-compat shows BRL-CAD databases: expected a scene file that ends in .asc".into(),
+        ));
+    };
+    for (shader, region) in unknown_shaders(looks) {
+        let what = format!("the shader `{shader}` of region {region} is not supported");
+        if !args.scene.options.lenient {
+            return Err(Error::Usage(format!("{what}; --lenient shows it as plastic")));
+        }
+        args.output.say(&format!("warning: {what}: shown as plastic"));
+    }
+    Ok(())
+}
+
 /// The options, checked before a long build starts.
 fn options(args: &RenderArgs) -> Result<RenderOptions> {
-    let (width, height) = args.camera.size.unwrap_or(DEFAULT_SIZE);
+    let (width, height) = args.camera.size.unwrap_or(if args.rt_compat { RT_SIZE } else { DEFAULT_SIZE });
     let options = RenderOptions {
         width,
         height,
         crop: args.crop,
         spp: args.spp,
         seed: args.seed,
-        integrator: args.integrator,
+        integrator: if args.rt_compat { Integrator::Rt } else { args.integrator },
         engine: args.engine.engine.clone(),
         tile: args.tile,
         depth: args.depth,
@@ -228,7 +255,8 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
     let engine = args.engine.find::<S>()?;
     let world = World::<S>::compile(description, args.scene.options.preset())?;
     let (width, height) = (options.width, options.height);
-    let camera = args.camera.ready(description, world.bounds(), (width, height))?;
+    let camera_args = if args.rt_compat { args.camera.or_default_view() } else { args.camera.clone() };
+    let camera = camera_args.ready(description, world.bounds(), (width, height))?;
     let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
     let output = render(&world, description, &camera, options, &watch)?;
     watch.bar.finish_and_clear();

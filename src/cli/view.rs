@@ -85,6 +85,16 @@ impl CameraArgs {
         }
     }
 
+    /// The same; if nothing says where to look from, `rt`'s default view.
+    pub fn or_default_view(&self) -> Self {
+        let is_silent = self.camera.is_none()
+            && self.view.is_none()
+            && self.fov.is_none()
+            && [self.eye, self.look_at, self.up].iter().all(Option::is_none);
+        let az = if is_silent { self.az.or(Some(DEFAULT_VIEW.0)) } else { self.az };
+        Self { az, ..self.clone() }
+    }
+
     /// The view script asked for.
     ///
     /// # Errors

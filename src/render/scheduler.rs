@@ -74,7 +74,8 @@ pub fn render_with<S: Real>(
 ) -> Result<RenderOutput> {
     let (tiling, window) = options.check()?;
     let start = Instant::now();
-    let shader = Shader::new(world, description, engine, headlight(camera), options.settings());
+    let shader =
+        Shader::new(world, description, engine, headlight(camera), options.settings()).with_rt(description, camera);
     let job = Job { shader, camera, tiling, rect: rect_of(window), options, progress };
     let tiles = tiling.tiles_in(job.rect);
     let painter = Mutex::new(Painter::new(options.width, options.height, window, &options.aovs));

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::boolean::Step;
+use super::boxes;
 use super::lower::{self, TOLERANCE};
 use super::model::{Database, ObjectKind};
 use super::regions::{PlacedRegion, Problem, walk};
 use super::shader::Shader;
+use super::solid::Solid;
 use super::tops::choose_tops;
 use super::view::View;
 use crate::error::{Error, Place, Result};
@@ -27,14 +29,14 @@ const LISTED: usize = 10;
 pub struct Looks {
     /// One for each part.
     pub regions: Vec<Look>,
-    /// Box around all bounded solids, subtracted ones too: what `rt` frames.
+    /// Box around all bounded regions: what `rt` frames.
     pub bounds: Option<(DVec3, DVec3)>,
     /// Shaders of regions that fill all space behind the others (`envmap`); their solids are not there.
     pub surroundings: Option<Shader>,
 }
 
 /// How a region looks.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Look {
     /// Its path, names after slashes.
     pub path: String,
@@ -46,8 +48,10 @@ pub struct Look {
     pub shader: Option<Shader>,
     /// For a region of one solid: where it stands, which is where a light of it shines from.
     pub centre: Option<DVec3>,
-    /// Box around its solids.
+    /// Its box, if it is bounded.
     pub bounds: Option<(DVec3, DVec3)>,
+    /// For a region of one arb: its corners in place.
+    pub arb: Option<Box<[DVec3; 8]>>,
     /// Rotation and scale of its only solid's place: the direction a light of it aims in turns with it.
     pub place: DAffine3,
 }
@@ -111,14 +115,18 @@ fn add_region(
     let material = material(description, region.color);
     let kind = ItemKind::Solids(index);
     description.groups[0].items.push(Item { transform: DAffine3::IDENTITY, material, kind });
-    let solid = |i: usize| match &database.objects[region.solids[i].object as usize].kind {
+    let object = |i: usize| Some(&database.objects[region.solids.get(i)?.object as usize].kind);
+    let solid = |i: usize| match object(i)? {
         ObjectKind::Solid(solid) => Some(solid),
         _ => None,
     };
-    let boxes = (0..region.solids.len()).filter_map(|i| lower::bounds(solid(i)?, &region.solids[i].transform));
-    let bounds = boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let bounds = boxes::of_region(region, |i| solid(i).map(|s| lower::bounds(s, &region.solids[i].transform)));
     let centre = match region.solids.as_slice() {
         [only] => solid(0).and_then(|solid| solid.centre()).map(|centre| only.transform.transform_point3(centre)),
+        _ => None,
+    };
+    let arb = match (region.solids.as_slice(), solid(0)) {
+        ([only], Some(Solid::Arb { points })) => Some(Box::new(points.map(|p| only.transform.transform_point3(p)))),
         _ => None,
     };
     let all = [looks.bounds, bounds].into_iter().flatten();
@@ -130,6 +138,7 @@ fn add_region(
         shader,
         centre,
         bounds,
+        arb,
         place: region.solids.first().map_or(DAffine3::IDENTITY, |solid| solid.transform),
     });
 }

@@ -93,6 +93,12 @@ pub(super) fn bounds(solid: &Solid, place: &DAffine3) -> Option<(DVec3, DVec3)> 
             let reach = DVec3::from(reach.to_array().map(f64::sqrt));
             Some((point(*v) - reach, point(*v) + reach))
         }
+        // A right cylinder, elliptic perhaps, has its true box.
+        Solid::Tgc { v, h, base: [a, b], top } if is_right_cylinder(*h, [*a, *b], *top) => {
+            let (a, b) = (vector(*a), vector(*b));
+            let reach = DVec3::from((a * a + b * b).to_array().map(f64::sqrt));
+            hull([point(*v), point(*v + *h)].into_iter().flat_map(|p| [p - reach, p + reach]))
+        }
         Solid::Tgc { v, h, base, top } => {
             let ends = [(point(*v), base), (point(*v + *h), top)];
             hull(ends.into_iter().flat_map(|(centre, [a, b])| {
@@ -119,6 +125,14 @@ pub(super) fn bounds(solid: &Solid, place: &DAffine3) -> Option<(DVec3, DVec3)> 
             boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
         }
     }
+}
+
+/// Whether both ends are alike and stand upright on the axis.
+fn is_right_cylinder(h: DVec3, base: [DVec3; 2], top: [DVec3; 2]) -> bool {
+    const ALIKE: f64 = 1e-6;
+    let alike = |i: usize| (base[i] - top[i]).length() <= ALIKE * base[i].length();
+    let upright = |d: DVec3| h.dot(d).abs() <= ALIKE * h.length() * d.length();
+    alike(0) && alike(1) && upright(base[0]) && upright(base[1])
 }
 
 fn hull(points: impl Iterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
