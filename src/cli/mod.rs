@@ -4,6 +4,7 @@ pub mod common;
 pub mod output;
 
 mod bench;
+mod compare;
 mod info;
 mod interrupt;
 mod isa;
@@ -31,6 +32,7 @@ Examples:
   lanecast bench                                       how fast, on small built-in scenes
   lanecast bench model.ply --rays primary,shadow       how fast, on a model of yours
   lanecast verify builtin:sphere-flake                 do all engines agree with the f64 oracle
+  lanecast compare a.exr b.exr -o heat.png             how far are two pictures apart, and where
   lanecast rays model.ply --kind ao -o ao.npy          rays for this and other programs
   lanecast trace model.ply --rays ao.npy --query any   trace a file of rays
 
@@ -55,6 +57,8 @@ enum Command {
     Trace(trace::TraceArgs),
     /// Write a file of rays of one class
     Rays(rays::RaysArgs),
+    /// Compare two pictures, or two files of hits: errors, what a person sees, classes, heat maps
+    Compare(compare::CompareArgs),
     /// Compare every engine with the f64 oracle, and bit for bit with each other
     Verify(verify::VerifyArgs),
     /// Counts, bounds, memory, tree quality and warnings of a scene
@@ -91,6 +95,7 @@ fn run(command: &Command) -> Result<()> {
         Command::Bench(args) => &args.output,
         Command::Trace(args) => &args.output,
         Command::Rays(args) => &args.output,
+        Command::Compare(args) => &args.output,
         Command::Verify(args) => &args.output,
         Command::Info(args) => &args.output,
     };
@@ -102,6 +107,7 @@ fn run(command: &Command) -> Result<()> {
         Command::Bench(args) => bench::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Rays(args) => rays::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Info(args) => info::run(args),
     }
