@@ -275,6 +275,7 @@ impl<S: Engines> Subject<'_, S> {
         Some(Outcome::Timed {
             seconds,
             repeat: one.seconds.len(),
+            passes: one.seconds.clone(),
             hits: one.answers.hit_count(),
             checksum: one.answers.checksum(),
             ratio: baseline.and_then(|b| paired_ratio_median(b, &one.seconds)),
