@@ -10,6 +10,7 @@ mod interrupt;
 mod isa;
 mod rays;
 mod render;
+mod report;
 mod trace;
 mod verify;
 
@@ -33,6 +34,7 @@ Examples:
   lanecast bench model.ply --rays primary,shadow       how fast, on a model of yours
   lanecast verify builtin:sphere-flake                 do all engines agree with the f64 oracle
   lanecast compare a.exr b.exr -o heat.png             how far are two pictures apart, and where
+  lanecast report out -o report.html                   results as one page to show to others
   lanecast rays model.ply --kind ao -o ao.npy          rays for this and other programs
   lanecast trace model.ply --rays ao.npy --query any   trace a file of rays
 
@@ -57,6 +59,8 @@ enum Command {
     Trace(trace::TraceArgs),
     /// Write a file of rays of one class
     Rays(rays::RaysArgs),
+    /// A folder of results as one page with plots, tables and pictures
+    Report(report::ReportArgs),
     /// Compare two pictures, or two files of hits: errors, what a person sees, classes, heat maps
     Compare(compare::CompareArgs),
     /// Compare every engine with the f64 oracle, and bit for bit with each other
@@ -96,6 +100,7 @@ fn run(command: &Command) -> Result<()> {
         Command::Trace(args) => &args.output,
         Command::Rays(args) => &args.output,
         Command::Compare(args) => &args.output,
+        Command::Report(args) => &args.output,
         Command::Verify(args) => &args.output,
         Command::Info(args) => &args.output,
     };
@@ -108,6 +113,7 @@ fn run(command: &Command) -> Result<()> {
         Command::Trace(args) => trace::run(args),
         Command::Rays(args) => rays::run(args),
         Command::Compare(args) => compare::run(args),
+        Command::Report(args) => report::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Info(args) => info::run(args),
     }

@@ -12,6 +12,7 @@ pub mod intervals;
 pub mod peers;
 pub mod pictures;
 pub mod raysets;
+pub mod report;
 pub mod rows;
 pub mod stats;
 pub mod timing;
