@@ -193,3 +193,26 @@ fn history_keeps_rows_and_names_their_revision() {
     let revision = files(&machine).remove(0);
     assert_eq!(files(&machine.join(revision)), ["square", "square-2"]);
 }
+
+#[test]
+fn explain_counts_compares_and_draws() {
+    let dir = square();
+    let words = "explain builtin:cornell --rays primary,shadow --engine scalar,packet8 --size 128x96 -o why";
+    let report = run(&dir, &format!("{words} --json")).json();
+    let engines = |class: usize| report["classes"][class]["engines"].as_array().expect("engines").clone();
+    let nodes = |class: usize, engine: usize| engines(class)[engine]["nodes_per_ray"].as_f64().expect("a number");
+    assert!(nodes(0, 1) < nodes(0, 0) && nodes(1, 1) < nodes(1, 0), "packets share visits: {report}");
+    assert_eq!(engines(0)[1]["packets"].as_u64(), Some(128 * 96 / 8));
+    assert!(report["tree"]["leaves"].as_u64() > Some(0), "{report}");
+    let drawn = files(&dir.path().join("why"));
+    assert_eq!(drawn.len(), 8, "2 classes x 2 engines x (EXR, PNG): {drawn:?}");
+    let film = lanecast::film::exr::read(&dir.path().join("why/cost-primary-scalar.exr")).expect("an EXR");
+    let nodes_map = film.f32_plane("cost.nodes").expect("a plane");
+    assert!(nodes_map.len() == 128 * 96 && nodes_map.iter().any(|&n| n > 1.0));
+    let text = run(&dir, words).out;
+    assert!(
+        text.contains("SAH cost") && text.contains("per packet") && text.contains("times as fast as scalar"),
+        "{text}"
+    );
+    binary::refused(dir.path(), &["explain", "square.ply", "--engine", "paket8"], "packet8");
+}
