@@ -216,3 +216,43 @@ fn explain_counts_compares_and_draws() {
     );
     binary::refused(dir.path(), &["explain", "square.ply", "--engine", "paket8"], "packet8");
 }
+
+/// Two scenes' worth of steps; a killed experiment goes on without measuring anything twice.
+#[test]
+fn experiments_resume_where_they_were() {
+    let dir = square();
+    let at = |name: &str| dir.path().join(name);
+    let text = "experiment \"tiny\" {\n question \"is it there?\"\n scenes square.ply\n rays primary diffuse\n \
+                engines scalar packet4\n size \"32x32\" \"64x64\"\n repeat 3\n}";
+    std::fs::write(at("tiny.kdl"), text).expect("a file");
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_lanecast"))
+        .args(["bench", "--experiment", "tiny.kdl", "-o", "out", "-q"])
+        .current_dir(dir.path())
+        .spawn()
+        .expect("the binary runs");
+    let first = at("out/square-32x32-t1-balanced/primary/bench.csv");
+    let begun = std::time::Instant::now();
+    while !first.exists() && begun.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    // The process may have ended by itself; what is there is whole either way.
+    let _gone = child.kill();
+    child.wait().expect("it ended");
+    let kept = std::fs::read_to_string(&first).expect("rows");
+    assert!(kept.contains("lanecast bench square.ply --rays primary --engines scalar,packet4 --size 32x32"), "{kept}");
+    let ended = run(&dir, "bench --experiment tiny.kdl -o out");
+    assert!(ended.err.contains("of 4 steps are finished already"), "{}", ended.err);
+    assert_eq!(std::fs::read_to_string(&first).expect("rows"), kept, "nothing is measured twice");
+    let again = run(&dir, "bench --experiment tiny.kdl -o out");
+    assert!(
+        again.err.contains("4 of 4 steps are finished already") && again.err.contains("0 steps in"),
+        "{}",
+        again.err
+    );
+    let cases = files(&at("out"));
+    assert_eq!(cases, ["experiment.kdl", "square-32x32-t1-balanced", "square-64x64-t1-balanced"]);
+    run(&dir, "report out -o report.html");
+    std::fs::write(at("tiny.kdl"), text.replace("packet4", "packet8")).expect("a file");
+    binary::refused(dir.path(), &["bench", "--experiment", "tiny.kdl", "-o", "out", "-q"], "another experiment");
+    binary::refused(dir.path(), &["bench", "--experiment", "square.ply"], "square.ply:10:1");
+}

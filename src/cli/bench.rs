@@ -1,6 +1,7 @@
 //! `lanecast bench`: engines x ray classes x scenes, as a table, as rows, as JSON.
 
 mod against;
+mod experiment;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -36,6 +37,7 @@ Examples:
   lanecast bench model.ply --peers obvhs,embree --embree libembree4.so.4 --threads 1
   lanecast bench model.ply --against ../old/lanecast --turns 8 --engines scalar,tile
   lanecast bench --compare results/before results/after
+  lanecast bench --experiment scenes/experiments/widths.kdl -o out/widths
   lanecast bench model.ply --record results
 
 Before the clock starts, every engine's hits are compared bit for bit with the scalar engine's (those of tile,
@@ -80,6 +82,13 @@ pub struct BenchArgs {
     /// nothing is measured
     #[arg(long, value_names = ["OLD", "NEW"], num_args = 2, conflicts_with_all = ["scenes", "engines", "peers", "folder"])]
     compare: Vec<PathBuf>,
+    /// Measure what a file asks for (docs/EXPERIMENTS.md; scenes/experiments has some); the same command goes on where it was
+    #[arg(
+        long,
+        value_name = "FILE.kdl",
+        conflicts_with_all = ["scenes", "engines", "peers", "compare", "against", "record"]
+    )]
+    experiment: Option<PathBuf>,
     /// Take turns with another lanecast (old, new, old, new, ...) and show what moved: the surest comparison
     #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["compare", "record"])]
     against: Option<PathBuf>,
@@ -121,6 +130,10 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     if let [old, new] = &args.compare[..] {
         let changes = compare::compare(&compare::read(old)?, &compare::read(new)?);
         return if args.output.json { json_to_stdout(&changes) } else { to_stdout(&compare::table(&changes)) };
+    }
+    if let Some(file) = &args.experiment {
+        experiment::run(file, args.folder.as_deref(), args.embree.as_deref(), &args.output)?;
+        return Ok(());
     }
     if let Some(other) = &args.against {
         let (_dropped_at_the_end, temporary) = against::temporary()?;
@@ -235,8 +248,11 @@ fn one<S: Engines>(
 
 fn write(dir: &Path, run: &Run, rows: &[Row], facts: &str) -> Result<()> {
     std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, e))?;
-    for (name, text) in [("bench.csv", rows::csv(run, rows)), ("bench.env.txt", facts.to_string())] {
-        write_atomically(&dir.join(name), |file| file.write_all(text.as_bytes()))?;
-    }
-    Ok(())
+    // The rows come last: a folder that has them is whole.
+    write_whole(&dir.join("bench.env.txt"), facts.as_bytes())?;
+    write_whole(&dir.join("bench.csv"), rows::csv(run, rows).as_bytes())
+}
+
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_atomically(path, |file| file.write_all(bytes))
 }

@@ -5,6 +5,7 @@ pub mod answers;
 pub mod bench;
 pub mod compare;
 pub mod env;
+pub mod experiment;
 pub mod explain;
 pub mod eye;
 pub mod history;

@@ -73,6 +73,18 @@ impl Row {
         self.text("quoted") != "false"
     }
 
+    /// The build preset that its command names; empty if it names none.
+    pub fn preset(&self) -> &str {
+        let mut words = self.text("command").split_ascii_whitespace();
+        words
+            .find_map(|word| match word.strip_prefix("--preset") {
+                Some("") => Some(""),
+                Some(rest) => rest.strip_prefix('='),
+                None => None,
+            })
+            .map_or("", |value| if value.is_empty() { words.next().unwrap_or_default() } else { value })
+    }
+
     /// Several columns as one key.
     pub fn key<const N: usize>(&self, columns: [&str; N]) -> [String; N] {
         columns.map(|column| self.text(column).to_string())

@@ -52,8 +52,15 @@ pub fn page(title: &str, options: &Options, found: &Found, sections: Vec<Section
 }
 
 /// Facts that are worth a row in the summary of machines.
-const SHOWN: [&str; 9] =
-    ["cpu", "cores available", "isa compiled", "rustc", "rustflags", "profile", "threads", "governor", "load average"];
+const SHOWN: [&str; 8] =
+    ["cpu", "cores available", "isa compiled", "rustc", "rustflags", "profile", "threads", "governor"];
+
+/// Most runs whose facts are told in full.
+const MOST_FACTS: usize = 12;
+
+fn facts(facts: &[(String, String)]) -> Markup {
+    table(&["fact", "value"], &facts.iter().map(|(name, value)| vec![name.clone(), value.clone()]).collect::<Vec<_>>())
+}
 
 /// Who measured: one row per run that differs from the others, and all facts on demand.
 fn machine(found: &Found) -> Markup {
@@ -76,8 +83,16 @@ fn machine(found: &Found) -> Markup {
     let mut head = vec!["revision"];
     head.extend(SHOWN);
     head.push("runs");
+    let firsts: Vec<&String> = rows.values().filter_map(|places| places.first()).collect();
+    let told: Vec<_> = found
+        .runs
+        .iter()
+        .filter(|run| firsts.contains(&&run.place) && !run.facts.is_empty())
+        .take(MOST_FACTS)
+        .collect();
     let body: Vec<Vec<String>> = rows
-        .into_iter()
+        .iter()
+        .map(|(cells, places)| (cells.clone(), places))
         .map(|(mut cells, places)| {
             let shown = places.iter().take(4).cloned().collect::<Vec<_>>().join(", ");
             cells.push(if places.len() > 4 { format!("{shown} and {} more", places.len() - 4) } else { shown });
@@ -88,14 +103,10 @@ fn machine(found: &Found) -> Markup {
         section #machine {
             h2 { "Machine" }
             div.scroll { (table(&head, &body)) }
-            @for run in &found.runs {
-                @if !run.facts.is_empty() {
-                    details {
-                        summary { "all facts about " (run.place) ", " (run.date) }
-                        div.scroll {
-                            (table(&["fact", "value"], &run.facts.iter().map(|(n, v)| vec![n.clone(), v.clone()]).collect::<Vec<_>>()))
-                        }
-                    }
+            @for run in told {
+                details {
+                    summary { "all facts about " (run.place) ", " (run.date) }
+                    div.scroll { (facts(&run.facts)) }
                 }
             }
         }

@@ -12,19 +12,26 @@ use crate::measure::intervals::{Estimate, Interval};
 /// What distinguishes one figure from another.
 const FIGURE: [&str; 4] = ["scene", "precision", "threads", "rays"];
 
-/// Rows of each figure: of every scene and setting those of its newest run, in written order.
+/// Rows of each figure: of every scene and setting, and every ray class, those of the newest run, in written order.
 fn newest(found: &Found) -> Vec<(String, Vec<&Row>)> {
-    let mut groups: BTreeMap<([String; 4], String), Vec<&Row>> = BTreeMap::new();
+    let mut groups: BTreeMap<([String; 4], String, String), Vec<&Row>> = BTreeMap::new();
     for row in &found.rows {
-        groups.entry((row.key(FIGURE), row.text("scene_hash").into())).or_default().push(row);
+        let key = (row.key(FIGURE), row.preset().to_string(), row.text("scene_hash").into());
+        groups.entry(key).or_default().push(row);
     }
-    let figures = groups.into_iter().map(|((key, _), rows)| {
-        let run = rows.iter().map(|row| row.run).max().unwrap_or(0);
-        let rows: Vec<&Row> = rows.into_iter().filter(|row| row.run == run && row.is_quoted()).collect();
+    let figures = groups.into_iter().map(|((key, preset, _), rows)| {
+        let mut last: BTreeMap<&str, usize> = BTreeMap::new();
+        for row in &rows {
+            let run = last.entry(row.text("class")).or_default();
+            *run = row.run.max(*run);
+        }
+        let is_last = |row: &&Row| row.is_quoted() && last.get(row.text("class")) == Some(&row.run);
+        let rows: Vec<&Row> = rows.iter().copied().filter(is_last).collect();
         let [scene, precision, threads, rays] = key;
         let prims = rows.first().map_or("", |row| row.text("prims"));
         let plural = if threads == "1" { "" } else { "s" };
-        (format!("{scene}: {prims} primitives, {rays} rays, {precision}, {threads} thread{plural}"), rows)
+        let preset = if preset.is_empty() { preset } else { format!(", preset {preset}") };
+        (format!("{scene}: {prims} primitives, {rays} rays, {precision}, {threads} thread{plural}{preset}"), rows)
     });
     figures.collect()
 }

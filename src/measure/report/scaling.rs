@@ -1,4 +1,4 @@
-//! How rates change with the number of threads and of primitives.
+//! How rates change with the number of threads, of primitives and of rays in the same picture.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,7 +22,7 @@ struct Axis {
     places: Places,
 }
 
-fn axes() -> [Axis; 2] {
+fn axes() -> [Axis; 3] {
     [
         Axis {
             column: "threads",
@@ -35,6 +35,13 @@ fn axes() -> [Axis; 2] {
             column: "prims",
             unit: "primitives",
             same: ["scene", "threads", "class", "precision", "rays"],
+            least: 3,
+            places: Places::Logarithmic,
+        },
+        Axis {
+            column: "rays",
+            unit: "rays",
+            same: ["scene", "scene_hash", "class", "precision", "threads"],
             least: 3,
             places: Places::Logarithmic,
         },
@@ -85,8 +92,8 @@ fn one(axis: &Axis, key: &[String; 5], rows: &[&Row]) -> Markup {
         })
         .collect();
     let head = ["engine", axis.unit, "Mrays/s (95 %)", "over the first"];
-    let [scene, .., class, precision, rays] = key;
-    let title = format!("{scene}, {class} rays over {} ({precision}, {rays} rays)", axis.unit);
+    let [scene, _, class, precision, last] = key;
+    let title = format!("{scene}, {class} rays over {} ({precision}, {}: {last})", axis.unit, axis.same[4]);
     let plot = lines(&drawn, &axis.places, axis.unit, "million rays per second");
     figure(&title, plot, &table(&head, &body), &used)
 }

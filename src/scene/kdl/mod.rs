@@ -17,8 +17,8 @@ pub mod meshes;
 mod scope;
 mod settings;
 mod shapes;
-mod source;
-mod syntax;
+pub(crate) mod source;
+pub(crate) mod syntax;
 mod terrain;
 #[cfg(test)]
 mod tests;
