@@ -56,8 +56,12 @@ pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &O
             measured += 1;
             bar.inc(1);
             if measured == 1 {
-                let rest = (steps - finished - 1) as u32;
-                output.say(&format!("the first step took {}; {rest} to go", seconds(begun.elapsed())));
+                let (rest, first) = ((steps - finished - 1) as u32, begun.elapsed());
+                output.say(&format!(
+                    "the first step took {}; {rest} to go, about {}",
+                    seconds(first),
+                    seconds(rest * first)
+                ));
             }
             Ok(())
         };
