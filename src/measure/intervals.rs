@@ -125,7 +125,7 @@ fn resampled(samples: &[f64], draw: u32, stream: u32) -> Vec<f64> {
 /// A number below `count` (which is not 0) for the `i`-th pick of a draw.
 fn pick(draw: u32, i: u32, stream: u32, count: usize) -> usize {
     let [bits, ..] = pcg4d([draw, i, stream, 0x1a9e]);
-    (u64::from(bits) * count as u64 >> 32) as usize
+    ((u64::from(bits) * count as u64) >> 32) as usize
 }
 
 #[cfg(test)]
