@@ -12,7 +12,7 @@
 //! | 5 | [`film`], [`shade`] | framebuffer and image files; materials, lights, integrators |
 //! | 4 | [`trace`] | the engines behind one trait |
 //! | 3 | [`scene`], [`camera`] | description, importers, world; cameras, tiles, ray generation |
-//! | 2 | [`bvh`], [`shape`] | trees over boxes; primitives: storage, bounds, kernels |
+//! | 2 | [`bvh`], [`shape`], [`csg`] | trees over boxes; primitives: storage, bounds, kernels; solids made of solids |
 //! | 1 | [`ray`] | rays, hits, packets, commit, counters |
 //! | 0 | [`lanes`], [`math`], [`error`] | SIMD lanes, affine maps and boxes, the error type |
 //!
@@ -23,6 +23,7 @@
 pub mod bvh;
 pub mod camera;
 pub mod cli;
+pub mod csg;
 pub mod error;
 pub mod film;
 pub mod lanes;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 const FLOORS: [&[&str]; 9] = [
     &["lanes", "math", "error"],
     &["ray"],
-    &["bvh", "shape"],
+    &["bvh", "shape", "csg"],
     &["scene", "camera"],
     &["trace"],
     &["film", "shade"],
@@ -19,8 +19,10 @@ const FLOORS: [&[&str]; 9] = [
 ];
 
 /// Edges between two modules of one floor, each with its reason.
-const SIBLINGS: [(&str, &str, &str); 2] = [
+const SIBLINGS: [(&str, &str, &str); 4] = [
     ("math", "lanes", "maps and boxes are written for lanes"),
+    ("csg", "shape", "the leaves of a solid are shapes"),
+    ("csg", "bvh", "many leaves are searched by a tree over their boxes"),
     ("camera", "scene", "a camera is made from its description"),
 ];
 

@@ -22,6 +22,16 @@ pub struct Counters {
     pub prim_lanes_active: u64,
     /// Lanes paid for in primitive tests.
     pub prim_lanes_total: u64,
+    /// Trees of solids tested (one tree against one packet).
+    pub solids: u64,
+    /// Leaves of trees of solids whose boxes the packets met.
+    pub solid_leaves_met: u64,
+    /// Of these, leaves that could make a difference.
+    pub solid_leaves_kept: u64,
+    /// Boundaries of leaves, vectors of lanes.
+    pub solid_events: u64,
+    /// Steps of the sweeps over them.
+    pub solid_steps: u64,
 }
 
 impl std::ops::AddAssign for Counters {
@@ -35,5 +45,10 @@ impl std::ops::AddAssign for Counters {
         self.node_lanes_total += o.node_lanes_total;
         self.prim_lanes_active += o.prim_lanes_active;
         self.prim_lanes_total += o.prim_lanes_total;
+        self.solids += o.solids;
+        self.solid_leaves_met += o.solid_leaves_met;
+        self.solid_leaves_kept += o.solid_leaves_kept;
+        self.solid_events += o.solid_events;
+        self.solid_steps += o.solid_steps;
     }
 }

@@ -4,7 +4,8 @@
 //! * Placement 0 is the root group's own geometry under the identity, if it has any; the others follow in the
 //!   order of a depth-first walk over the root's items.
 //! * Inside an object, primitive numbers count through its parts in the order they were written; every triangle
-//!   of a mesh takes a number, also one that will turn out degenerate.
+//!   of a mesh takes a number, also one that will turn out degenerate. A tree of solids takes one for every leaf: a
+//!   hit's number says whose surface is seen, the part it belongs to says which tree.
 
 use std::sync::Arc;
 
@@ -12,6 +13,7 @@ use glam::DAffine3;
 
 use super::description::{Description, GroupId, ItemKind, MaterialId, Shape};
 use super::mesh::Mesh;
+use super::solids::flat::{FlatTree, flatten};
 use crate::error::{Error, Result};
 
 /// Largest number of placements a description may expand to.
@@ -61,6 +63,8 @@ pub enum PartKind {
     Mesh(Arc<Mesh>),
     /// One analytic shape.
     Shape(Shape),
+    /// A tree of solids; its leaves are the primitives.
+    Solids(Arc<FlatTree>),
 }
 
 /// An object placed in the world.
@@ -77,11 +81,13 @@ impl Assembly {
     ///
     /// # Errors
     /// A group that contains itself, nesting deeper than [`MAX_NESTING`], more than [`MAX_PLACEMENTS`] placements,
-    /// more than 2^32 - 2 primitives in one object, or an instance transform that cannot be inverted.
+    /// more than 2^32 - 2 primitives in one object, an instance transform that cannot be inverted,
+    /// or a tree of solids that [`FlatTree::new`] refuses.
     pub fn new(description: &Description) -> Result<Self> {
         let file = description.source.clone().unwrap_or_else(|| format!("builtin:{}", description.name).into());
         let fail = |what: String| Error::whole(&file, what);
         let mut objects = Vec::new();
+        let mut trees: Vec<Option<Arc<FlatTree>>> = vec![None; description.solids.len()];
         let mut object_of_group = vec![None; description.groups.len()];
         for (g, group) in description.groups.iter().enumerate() {
             let mut object = AssemblyObject { name: group.name.clone(), ..Default::default() };
@@ -93,6 +99,20 @@ impl Assembly {
                         let mesh = description.meshes[*m as usize].clone();
                         let count = mesh.triangles.len() as u64;
                         (PartKind::Mesh(mesh), count)
+                    }
+                    ItemKind::Solids(t) => {
+                        let known = &mut trees[*t as usize];
+                        let tree = match known {
+                            Some(tree) => tree.clone(),
+                            None => {
+                                let source = &description.solids[*t as usize];
+                                let tree =
+                                    flatten(source).map_err(|e| fail(format!("solid `{}`: {e}", source.name)))?;
+                                known.insert(tree).clone()
+                            }
+                        };
+                        let count = tree.leaf_count() as u64;
+                        (PartKind::Solids(tree), count)
                     }
                 };
                 let total = u64::from(object.prim_count) + count;

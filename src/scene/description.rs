@@ -9,7 +9,9 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
+use super::brlcad::describe::Looks;
 use super::mesh::Mesh;
+use super::solids::SolidTree;
 
 /// Index into [`Description::groups`].
 pub type GroupId = u32;
@@ -29,6 +31,8 @@ pub struct Description {
     pub groups: Vec<Group>,
     /// Meshes referenced by items.
     pub meshes: Vec<Arc<Mesh>>,
+    /// Trees of solids that items place.
+    pub solids: Vec<Arc<SolidTree>>,
     /// Materials; index 0 is the default material.
     pub materials: Vec<Material>,
     /// Lights; empty means the renderer adds a default light from the camera's side.
@@ -41,6 +45,8 @@ pub struct Description {
     pub ambient: DVec3,
     /// Precision this scene asks for (`None`: f32).
     pub precision: Option<Precision>,
+    /// Looks of a BRL-CAD database's regions, which only its own lighting model knows; object 0 has a part for each.
+    pub looks: Option<Arc<Looks>>,
     /// Things worth telling the user (`info` prints them): ignored statements, unknown properties.
     pub warnings: Vec<String>,
 }
@@ -81,6 +87,8 @@ pub enum ItemKind {
     Shape(Shape),
     /// A mesh: index into [`Description::meshes`].
     Mesh(u32),
+    /// A tree of solids: index into [`Description::solids`].
+    Solids(u32),
     /// An instance of a group: geometry is shared, not copied.
     Instance(GroupId),
 }
@@ -182,12 +190,14 @@ impl Description {
             hash: String::new(),
             groups: vec![Group::default()],
             meshes: Vec::new(),
+            solids: Vec::new(),
             materials: vec![Material::default()],
             lights: Vec::new(),
             cameras: Vec::new(),
             background: DVec3::ZERO,
             ambient: DVec3::splat(0.1),
             precision: None,
+            looks: None,
             warnings: Vec::new(),
         }
     }

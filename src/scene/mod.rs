@@ -2,6 +2,7 @@
 //! engines trace.
 
 pub mod assembly;
+pub mod brlcad;
 pub mod builtin;
 pub mod description;
 pub mod gltf;
@@ -11,6 +12,7 @@ pub mod mesh;
 pub mod obj;
 pub mod ply;
 pub mod reference;
+pub mod solids;
 pub mod stl;
 mod text;
 pub mod unpack;

@@ -16,6 +16,12 @@ pub(super) fn magnitude(assembly: &Assembly, prim: u32, inst: u32) -> DVec3 {
             a.abs().max(b.abs()).max(c.abs())
         }
         PartKind::Shape(_) => DVec3::ONE,
+        PartKind::Solids(tree) => {
+            let leaf = &tree.leaves[(prim - part.first_prim) as usize];
+            let (lo, hi) = leaf.solid.bounds();
+            let size = lo.abs().max(hi.abs());
+            through(&leaf.to_tree, if size.is_finite() { size } else { DVec3::ONE })
+        }
     };
     through(&placement.to_world, through(&part.to_object, local))
 }

@@ -5,7 +5,8 @@
 //!
 //! Analytic shapes report the number of the face that was hit as `u` (and 0 as `v`):
 //! sphere, half-space and disc 0; cuboid 0..=5 for -x, +x, -y, +y, -z, +z; cylinder and cone 0 for the side, 1 for
-//! the cap at z = 0, 2 for the cap at z = 1.
+//! the cap at z = 0, 2 for the cap at z = 1. The files of the solids that only trees of solids hold (polyhedra, tori,
+//! quadrics between slabs, tapered solids) number their own.
 
 mod block;
 mod cone;
@@ -14,8 +15,13 @@ mod cylinder;
 mod disc;
 mod half_space;
 mod placed;
+mod planes;
+pub mod quadric;
+pub mod quartic;
 mod span;
 mod sphere;
+mod taper;
+mod torus;
 mod triangle;
 
 pub use block::{BLOCK, Block};
@@ -25,9 +31,12 @@ pub use cylinder::Cylinder;
 pub use disc::Disc;
 pub use half_space::HalfSpace;
 pub use placed::{Placed, PlacedRecord};
+pub use planes::planes_span;
 pub use span::{Solid, Span};
 pub use sphere::{Sphere, SphereRecord, WorldSphere};
-pub use triangle::{Degenerate, Triangle, TriangleBlock};
+pub use taper::{taper, taper_normal};
+pub use torus::{torus, torus_normal};
+pub use triangle::{Degenerate, Triangle, TriangleBlock, Turned, around};
 
 #[cfg(test)]
 mod tests;

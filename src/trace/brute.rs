@@ -42,6 +42,7 @@ fn blocks_by_class<S: crate::lanes::Real>(object: &Object<S>) -> impl Iterator<I
         let sizes = match class {
             Class::Triangle => object.triangles.iter().map(Block::len).collect(),
             Class::WorldSphere => object.spheres.iter().map(Block::len).collect(),
+            Class::Solids => object.solid_blocks.iter().map(Vec::len).collect(),
             _ => object.placed[class as usize].iter().map(Block::len).collect(),
         };
         (class, sizes)

@@ -1,6 +1,7 @@
 //! Leaves: one block of primitives against a packet.
 
 use super::query::Query;
+use super::solids;
 use crate::bvh::Child;
 use crate::lanes::Lanes;
 use crate::ray::{Packet, slab::Interval};
@@ -18,11 +19,17 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
     lanes: u32,
 ) {
     let (at, count) = (leaf.index as usize, usize::from(leaf.count));
+    if leaf.class == Class::Solids as u8 {
+        for &solid in &object.solid_blocks[at] {
+            solids::trace(&object.solids[solid as usize], inst, packet, query, lanes);
+        }
+        return;
+    }
     query.count_leaf(lanes, count);
     match Class::ALL[usize::from(leaf.class)] {
         Class::Triangle => {
             let block = &object.triangles[at];
-            Triangle::intersect(packet, block, (1 << count) - 1, lanes, |found, lanes, prim| {
+            Triangle::intersect(packet, query.hit.t, block, (1 << count) - 1, lanes, |found, lanes, prim| {
                 query.take(lanes, found, prim, inst)
             });
         }
@@ -40,7 +47,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
 }
 
-/// Tests an object's half-spaces, which no tree can hold.
+/// Tests an object's half-spaces and endless solids, which no tree can hold.
 #[inline(always)]
 pub fn unbounded<V: Lanes, const ANY: bool, const COUNT: bool>(
     object: &Object<V::Scalar>,
@@ -52,6 +59,9 @@ pub fn unbounded<V: Lanes, const ANY: bool, const COUNT: bool>(
     for block in &object.unbounded {
         query.count_leaf(lanes, block.len());
         placed::<V, HalfSpace, ANY, COUNT>(block, block.len(), inst, packet, query, lanes);
+    }
+    for &solid in &object.unbounded_solids {
+        solids::trace(&object.solids[solid as usize], inst, packet, query, lanes);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::single::Waiting;
 use crate::bvh::Child;
+use crate::csg;
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::{Candidate, Counters, HitPacket};
 
@@ -19,6 +20,8 @@ pub struct Stack<S> {
     near: Vec<S>,
     /// What waits for a single ray.
     pub waiting: Vec<Waiting<S>>,
+    /// What trees of solids need.
+    pub solids: csg::Scratch<S>,
 }
 
 impl<S: Real> Stack<S> {

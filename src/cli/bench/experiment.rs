@@ -114,7 +114,7 @@ fn measure(
 ) -> Result<()> {
     let beside = file.parent().unwrap_or(Path::new("")).join(&case.scene);
     let scene = if beside.is_file() { beside.to_string_lossy().into_owned() } else { case.scene.clone() };
-    let description = load(&scene, &LoadOptions { set: case.set.clone(), allow_outside: false })?;
+    let description = load(&scene, &LoadOptions { set: case.set.clone(), ..Default::default() })?;
     let workers = Workers::new(case.threads as usize)?.flushing(!case.peers.is_empty());
     let plan = Plan {
         kinds: kinds.to_vec(),

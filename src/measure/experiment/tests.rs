@@ -85,7 +85,7 @@ fn shipped_experiments_are_sound() {
             if case.set.iter().all(|(_, value)| value.parse::<f64>().is_ok_and(|x| x < 300.0)) {
                 crate::scene::load::load(
                     &case.scene,
-                    &crate::scene::load::LoadOptions { set: case.set.clone(), allow_outside: false },
+                    &crate::scene::load::LoadOptions { set: case.set.clone(), ..Default::default() },
                 )
                 .unwrap();
             }

@@ -27,7 +27,7 @@ impl WorldTriangles {
     /// Why peers cannot have this scene: analytic shapes, no triangles, or more than [`MAX_TRIANGLES`].
     pub fn flatten(assembly: &Assembly) -> Result<Self, String> {
         let parts = || assembly.objects.iter().flat_map(|object| &object.parts);
-        let shapes = parts().filter(|part| matches!(part.kind, PartKind::Shape(_))).count();
+        let shapes = parts().filter(|part| !matches!(part.kind, PartKind::Mesh(_))).count();
         if shapes > 0 {
             return Err(format!("the scene has {shapes} analytic shapes, peers get triangles only"));
         }
@@ -72,7 +72,7 @@ fn vertices_of(assembly: &Assembly, placement: &Placement) -> u64 {
     let parts = &assembly.objects[placement.object as usize].parts;
     let of_part = |part: &Part| match &part.kind {
         PartKind::Mesh(mesh) => mesh.positions.len() as u64,
-        PartKind::Shape(_) => 0,
+        PartKind::Shape(_) | PartKind::Solids(_) => 0,
     };
     parts.iter().map(of_part).sum()
 }

@@ -5,7 +5,7 @@
 //! times the primitive's size away. Some start on the surface, some run along an axis (and so meet vertices and
 //! edges exactly), some end before, at or behind the point.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 use rayon::prelude::*;
 
 use super::{BATCH, DIMENSION, RayKind, finite};
@@ -13,6 +13,7 @@ use crate::camera::sampling::PixelRandom;
 use crate::ray::Rays;
 use crate::scene::assembly::{Assembly, PartKind, Placement};
 use crate::scene::description::Shape;
+use crate::scene::solids::Solid;
 use crate::shape::Triangle;
 
 /// Primitives tried for one ray until one is found that can be hit.
@@ -105,6 +106,10 @@ fn on_primitive(assembly: &Assembly, placement: &Placement, prim: u32, draw: &mu
             Some(on_triangle(corners, draw))
         }
         PartKind::Shape(shape) => Some(in_shape(shape, &to_world, draw)),
+        PartKind::Solids(tree) => {
+            let leaf = &tree.leaves[(prim - part.first_prim) as usize];
+            Some(in_solid(&leaf.solid, &(to_world * leaf.to_tree), draw))
+        }
     }
 }
 
@@ -140,6 +145,16 @@ fn in_shape(shape: &Shape, to_world: &DAffine3, draw: &mut Draw) -> Target {
     let m = to_world.matrix3;
     let size = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
     Target { point: to_world.transform_point3(local), size }
+}
+
+/// In the solid's box, often on a face of it.
+fn in_solid(solid: &Solid, to_world: &DAffine3, draw: &mut Draw) -> Target {
+    if let Solid::Shape(shape) = solid {
+        return in_shape(shape, to_world, draw);
+    }
+    let (lo, hi) = solid.bounds();
+    let to_box = DAffine3::from_mat3_translation(DMat3::from_diagonal((hi - lo) * 0.5), (lo + hi) * 0.5);
+    in_shape(&Shape::Cuboid, &(*to_world * to_box), draw)
 }
 
 /// A ray as it stands in a ray file.

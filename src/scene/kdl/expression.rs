@@ -49,10 +49,8 @@ pub trait Names {
 /// Whether `name` may be given to a parameter or an index.
 pub fn is_free_name(name: &str) -> bool {
     let letter = |c: char| c.is_alphabetic() || c == '_';
-    name.starts_with(letter)
-        && name.chars().all(|c| letter(c) || c.is_ascii_digit())
-        && name != "pi"
-        && FUNCTIONS.iter().all(|f| f.0 != name)
+    let word = |word: &str| word.starts_with(letter) && word.chars().all(|c| letter(c) || c.is_ascii_digit());
+    name.split('.').all(word) && name != "pi" && FUNCTIONS.iter().all(|f| f.0 != name)
 }
 
 /// The finite value of `text`.
@@ -185,7 +183,15 @@ impl<'a> Parser<'a> {
     fn name(&mut self) -> Result<f64, Fault> {
         let start = self.at;
         let rest = &self.text[start..];
-        let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+        let word = |from: usize| {
+            let end = rest[from..].find(|c: char| !(c.is_alphanumeric() || c == '_'));
+            end.map_or(rest.len(), |end| from + end)
+        };
+        let mut end = word(0);
+        // Words joined by dots are one name: hole.radius.
+        while rest[end..].strip_prefix('.').is_some_and(|r| r.starts_with(|c: char| c.is_alphabetic() || c == '_')) {
+            end = word(end + 1);
+        }
         let name = &rest[..end];
         self.at += end;
         if self.eat('(') {

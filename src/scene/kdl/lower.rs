@@ -10,7 +10,7 @@ use super::meshes::{Key, MAX_GENERATED, MeshFiles, Store, polygon};
 use super::scope::Scope;
 use super::source::{Span, quote};
 use super::syntax::Node;
-use super::{expression, flake, settings, shapes, terrain, transform, twig};
+use super::{expression, flake, settings, shapes, solids, terrain, transform, twig};
 use crate::error::{Error, Result};
 use crate::scene::description::{Description, GroupId, Item, ItemKind, MaterialId, Shape};
 
@@ -18,10 +18,8 @@ use crate::scene::description::{Description, GroupId, Item, ItemKind, MaterialId
 pub const MAX_ITEMS: usize = 1 << 21;
 
 /// Statements that place something, shapes apart.
-const PLACING: [&str; 9] =
+pub const PLACING: [&str; 9] =
     ["group", "instance", "repeat", "choose", "mesh", "polygon", "sphere-flake", "terrain", "twig"];
-/// Names kept for solids made of solids.
-const RESERVED: [&str; 3] = ["union", "intersection", "difference"];
 
 /// Where items go: the group, the way into its space, the material they inherit.
 #[derive(Clone, Copy)]
@@ -36,6 +34,11 @@ impl Place {
     pub fn root_of(group: GroupId) -> Self {
         Self { group, to_group: DAffine3::IDENTITY, material: None }
     }
+
+    /// The way into the group's space and the material.
+    pub fn parts(&self) -> (DAffine3, Option<MaterialId>) {
+        (self.to_group, self.material)
+    }
 }
 
 /// Builds the groups of a description.
@@ -48,6 +51,8 @@ pub struct Lowering<'a, 'n> {
     pub materials: HashMap<&'n str, MaterialId>,
     /// Defined groups by name.
     pub groups: HashMap<&'n str, GroupId>,
+    /// Their `define` statements.
+    pub definitions: HashMap<&'n str, &'n Node<'a>>,
     /// Instances met so far.
     pub links: Vec<Link>,
     /// Meshes met so far.
@@ -91,6 +96,7 @@ impl<'a, 'n> Lowering<'a, 'n> {
                 let place = self.place(&fields, &fields.rest, shapes::fields_of(name), place)?;
                 self.add(ItemKind::Shape(shape), local, place, node.span)
             }
+            name if solids::OPERATIONS.contains(&name) || solids::SOLIDS.contains(&name) => self.solid(node, place),
             _ => Err(self.misplaced(node)),
         }
     }
@@ -115,7 +121,7 @@ impl<'a, 'n> Lowering<'a, 'n> {
     }
 
     /// `place` moved by `transforms` and with the statement's own material.
-    fn place(
+    pub fn place(
         &self,
         fields: &Fields<'_, 'n, 'a>,
         transforms: &[&'n Node<'a>],
@@ -137,11 +143,24 @@ impl<'a, 'n> Lowering<'a, 'n> {
         Ok(Place { to_group: place.to_group * own, material, ..place })
     }
 
-    fn add(&mut self, kind: ItemKind, local: DAffine3, place: Place, span: Span) -> Result<()> {
+    /// Counts something placed.
+    ///
+    /// # Errors
+    /// More than [`MAX_ITEMS`].
+    pub fn count_item(&mut self, span: Span) -> Result<()> {
         self.item_count += 1;
-        if self.item_count > MAX_ITEMS {
-            return Err(self.scope.source.error(span, format!("the scene expands to more than {MAX_ITEMS} items")));
+        match self.item_count > MAX_ITEMS {
+            true => Err(self.scope.source.error(span, format!("the scene expands to more than {MAX_ITEMS} items"))),
+            false => Ok(()),
         }
+    }
+
+    /// Puts an item into the group of `place`.
+    ///
+    /// # Errors
+    /// Too many items, transforms that cannot be inverted.
+    pub fn add(&mut self, kind: ItemKind, local: DAffine3, place: Place, span: Span) -> Result<()> {
+        self.count_item(span)?;
         let transform = place.to_group * local;
         transform::check_invertible(&self.scope, transform, span)?;
         let items = &mut self.description.groups[place.group as usize].items;
@@ -164,6 +183,18 @@ impl<'a, 'n> Lowering<'a, 'n> {
 
     /// `repeat 100 index="i" { ... }`: the block once for each i = 0, 1, ... 99.
     fn repeat(&mut self, node: &'n Node<'a>, place: Place) -> Result<()> {
+        self.rounds(node, |lowering, items| items.iter().try_for_each(|item| lowering.item(item, place)))
+    }
+
+    /// Calls `round` with the block's items for each value of the index.
+    ///
+    /// # Errors
+    /// A count or an index that does not fit, and those of `round`.
+    pub fn rounds(
+        &mut self,
+        node: &'n Node<'a>,
+        mut round: impl FnMut(&mut Self, &[&'n Node<'a>]) -> Result<()>,
+    ) -> Result<()> {
         let fields = self.fields(node, &["index"], &PLACING)?;
         let mut count = Vec::new();
         for argument in fields.arguments() {
@@ -187,9 +218,7 @@ impl<'a, 'n> Lowering<'a, 'n> {
         for i in 0..count {
             self.scope.spend(1, node.span)?;
             self.scope.indices[level].1 = i as f64;
-            for item in &items {
-                self.item(item, place)?;
-            }
+            round(self, &items)?;
         }
         self.scope.indices.pop();
         Ok(())
@@ -197,6 +226,15 @@ impl<'a, 'n> Lowering<'a, 'n> {
 
     /// `choose "3 * random(i)" { ... }`: the item whose number, from 0, is the value rounded down.
     fn choose(&mut self, node: &'n Node<'a>, place: Place) -> Result<()> {
+        let chosen = self.chosen(node)?;
+        self.item(chosen, place)
+    }
+
+    /// The item that a `choose` statement takes.
+    ///
+    /// # Errors
+    /// A number that names none.
+    pub fn chosen(&self, node: &'n Node<'a>) -> Result<&'n Node<'a>> {
         let fields = self.fields(node, &[], &PLACING)?;
         let choice = match *numbers_of(&self.scope, &node.entries)?.as_slice() {
             [x] => x.floor(),
@@ -207,11 +245,20 @@ impl<'a, 'n> Lowering<'a, 'n> {
             let last = items.len() as f64 - 1.0;
             return Err(fields.error(format!("expected an item from 0 to {last}, found {choice}")));
         }
-        self.item(items[choice as usize], place)
+        Ok(items[choice as usize])
     }
 
     /// `mesh "file.ply" units=mm`.
     fn mesh_file(&mut self, node: &'n Node<'a>, place: Place) -> Result<()> {
+        let (mesh, scale, place) = self.mesh_of(node, place)?;
+        self.add(ItemKind::Mesh(mesh), scale, place, node.span)
+    }
+
+    /// The mesh of a `mesh` statement, the scale of its unit, where it goes.
+    ///
+    /// # Errors
+    /// The first thing that is wrong in the statement or the file.
+    pub fn mesh_of(&mut self, node: &'n Node<'a>, place: Place) -> Result<(u32, DAffine3, Place)> {
         const ALLOWED: [&str; 2] = ["units", "material"];
         let fields = self.fields(node, &ALLOWED, &transform::NAMES)?;
         let (written, span) = fields.title()?.ok_or_else(|| fields.error("expected `mesh \"file.ply\"`"))?;
@@ -230,7 +277,7 @@ impl<'a, 'n> Lowering<'a, 'n> {
             Some(mesh) => mesh,
             None => self.read_mesh(written, span)?,
         };
-        self.add(ItemKind::Mesh(mesh), DAffine3::from_scale(glam::DVec3::splat(scale)), place, node.span)
+        Ok((mesh, DAffine3::from_scale(glam::DVec3::splat(scale)), place))
     }
 
     fn read_mesh(&mut self, written: &str, span: Span) -> Result<u32> {
@@ -330,9 +377,6 @@ impl<'a, 'n> Lowering<'a, 'n> {
     fn misplaced(&self, node: &Node<'_>) -> Error {
         let source = self.scope.source;
         let name = node.name.as_ref();
-        if RESERVED.contains(&name) {
-            return source.error(node.span, format!("`{name}` is not supported yet: solids cannot be combined"));
-        }
         if transform::NAMES.contains(&name) {
             let what = format!("`{name}` must come before the items of a block, which it transforms together");
             return source.error(node.span, what).with_help("put what it should act on into a `group`");
@@ -341,7 +385,7 @@ impl<'a, 'n> Lowering<'a, 'n> {
             return source.error(node.span, format!("`{name}` belongs to the top level of the file"));
         }
         let known = shapes::NAMES.iter().chain(&PLACING).chain(&settings::NAMES).chain(&transform::NAMES);
-        let known = known.chain(&["define"]).copied();
+        let known = known.chain(&solids::OPERATIONS).chain(&solids::SOLIDS).chain(&["define"]).copied();
         source.error_near(node.span, format!("unknown statement {}", quote(name)), name, known)
     }
 }

@@ -17,6 +17,7 @@ pub mod meshes;
 mod scope;
 mod settings;
 mod shapes;
+mod solids;
 pub(crate) mod source;
 pub(crate) mod syntax;
 mod terrain;
@@ -66,6 +67,7 @@ pub fn parse(
         description: Description::new(name),
         materials: HashMap::from([("default", 0)]),
         groups: HashMap::new(),
+        definitions: HashMap::new(),
         links: Vec::new(),
         store: Store::default(),
         files,
@@ -91,7 +93,7 @@ pub fn parse(
 }
 
 /// Takes up what later statements refer to, wherever it stands: units, materials, the names of groups.
-fn declare<'n>(lowering: &mut Lowering<'_, 'n>, nodes: &'n [Node<'_>]) -> Result<()> {
+fn declare<'a, 'n>(lowering: &mut Lowering<'a, 'n>, nodes: &'n [Node<'a>]) -> Result<()> {
     let source = lowering.scope.source;
     let mut seen = HashSet::new();
     for node in nodes {
@@ -110,6 +112,7 @@ fn declare<'n>(lowering: &mut Lowering<'_, 'n>, nodes: &'n [Node<'_>]) -> Result
                 if lowering.groups.insert(title, group).is_some() {
                     return Err(source.error(span, format!("group {} is defined twice", quote(title))));
                 }
+                lowering.definitions.insert(title, node);
                 lowering.description.groups.push(Group { name: title.to_string(), items: Vec::new() });
             }
             _ => {}

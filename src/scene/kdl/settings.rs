@@ -95,7 +95,10 @@ pub fn parameter(scope: &mut Scope<'_>, node: &Node<'_>, set: &[(String, String)
         return Err(scope.source.error(name_entry.span, "expected the parameter's name"));
     };
     if !super::expression::is_free_name(name) {
-        let what = format!("{} cannot name a parameter: letters, digits and _, not a function", quote(name));
+        let what = format!(
+            "{} cannot name a parameter: words of letters, digits and _ with dots between them, not a function",
+            quote(name)
+        );
         return Err(scope.source.error(name_entry.span, what));
     }
     if scope.parameters.contains_key(name.as_ref()) {

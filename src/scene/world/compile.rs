@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
-use super::{Class, Counts, Instance, Object, World};
+use super::{Class, Counts, Instance, Object, PlacedSolid, World, solids};
 use crate::bvh::{self, LEAF_PRIMS, Leaf, Preset, Tree};
 use crate::error::Result;
 use crate::lanes::Real;
@@ -13,6 +13,7 @@ use crate::math::{Aabb, Affine, transformed_bounds};
 use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind, Placement};
 use crate::scene::description::{Description, Shape};
 use crate::scene::mesh::Mesh;
+use crate::scene::solids::flat::{FlatLeaf, FlatTree};
 use crate::shape::{
     BLOCK, Block, Cone, Cuboid, Cylinder, Degenerate, Disc, HalfSpace, Placed, PlacedRecord, Sphere, SphereRecord,
     Triangle, WorldSphere,
@@ -34,7 +35,7 @@ impl<S: Real> World<S> {
         for object in &assembly.objects {
             let mut primitives = Primitives::default();
             for part in &object.parts {
-                primitives.add(part, &mut counts);
+                primitives.add(part, preset, &mut counts);
             }
             objects.push(primitives.build(preset));
         }
@@ -52,6 +53,8 @@ enum Record<S> {
     Triangle([S; 9]),
     Sphere(SphereRecord<S>),
     Placed(Class, PlacedRecord<S>),
+    /// Index into the object's solids.
+    Solids(u32),
 }
 
 /// Primitives of one object with bounds, and those without.
@@ -62,19 +65,43 @@ struct Primitives<S> {
     boxes: Vec<Aabb<S>>,
     classes: Vec<u8>,
     unbounded: Vec<(PlacedRecord<S>, u32)>,
+    solids: Vec<PlacedSolid<S>>,
+    unbounded_solids: Vec<u32>,
 }
 
 impl<S> Default for Primitives<S> {
     fn default() -> Self {
-        Self { records: Vec::new(), ids: Vec::new(), boxes: Vec::new(), classes: Vec::new(), unbounded: Vec::new() }
+        Self {
+            records: Vec::new(),
+            ids: Vec::new(),
+            boxes: Vec::new(),
+            classes: Vec::new(),
+            unbounded: Vec::new(),
+            solids: Vec::new(),
+            unbounded_solids: Vec::new(),
+        }
     }
 }
 
 impl<S: Real> Primitives<S> {
-    fn add(&mut self, part: &Part, counts: &mut Counts) {
+    fn add(&mut self, part: &Part, preset: Preset, counts: &mut Counts) {
         match &part.kind {
             PartKind::Mesh(mesh) => self.add_mesh(part, mesh, counts),
             PartKind::Shape(shape) => self.add_shape(part, shape, counts),
+            PartKind::Solids(tree) => self.add_solids(part, tree, preset, counts),
+        }
+    }
+
+    fn add_solids(&mut self, part: &Part, tree: &FlatTree, preset: Preset, counts: &mut Counts) {
+        let built = solids::compile::<S>(tree, &part.to_object, preset);
+        counts.singular += built.dropped as u64;
+        for solid in built.solids {
+            let (at, bounds) = (self.solids.len() as u32, solid.bounds);
+            self.solids.push(PlacedSolid { solid, first_prim: part.first_prim });
+            match bounds.is_bounded() {
+                true => self.push(Record::Solids(at), part.first_prim, bounds, Class::Solids),
+                false => self.unbounded_solids.push(at),
+            }
         }
     }
 
@@ -135,7 +162,7 @@ impl<S: Real> Primitives<S> {
         }
     }
 
-    fn build(self, preset: Preset) -> Object<S> {
+    fn build(mut self, preset: Preset) -> Object<S> {
         let (tree, leaves) = bvh::build(&self.boxes, &self.classes, preset);
         let mut object = Object {
             tree,
@@ -143,6 +170,9 @@ impl<S: Real> Primitives<S> {
             spheres: Vec::new(),
             placed: Default::default(),
             unbounded: Vec::new(),
+            solids: std::mem::take(&mut self.solids),
+            solid_blocks: Vec::new(),
+            unbounded_solids: std::mem::take(&mut self.unbounded_solids),
         };
         for leaf in &leaves {
             self.fill(&mut object, leaf);
@@ -162,6 +192,7 @@ impl<S: Real> Primitives<S> {
         match Class::ALL[usize::from(leaf.class)] {
             Class::Triangle => object.triangles.push(Block::empty()),
             Class::WorldSphere => object.spheres.push(Block::empty()),
+            Class::Solids => object.solid_blocks.push(Vec::new()),
             class => object.placed[class as usize].push(Block::empty()),
         }
         let at = leaf.block as usize;
@@ -171,6 +202,7 @@ impl<S: Real> Primitives<S> {
                 Record::Triangle(n) => object.triangles[at].set(i, n, id),
                 Record::Sphere(n) => object.spheres[at].set(i, n, id),
                 Record::Placed(class, n) => object.placed[class as usize][at].set(i, n, id),
+                Record::Solids(solid) => object.solid_blocks[at].push(solid),
             }
         }
     }
@@ -241,6 +273,10 @@ fn material_runs(object: &AssemblyObject, description: &Description) -> Vec<(u32
     let mut runs = Vec::new();
     for part in &object.parts {
         runs.push((part.first_prim, part.material.unwrap_or(0)));
+        if let PartKind::Solids(tree) = &part.kind {
+            let own = |leaf: &FlatLeaf| leaf.material.or(part.material).unwrap_or(0);
+            runs.extend(tree.leaves.iter().zip(part.first_prim..).map(|(leaf, prim)| (prim, own(leaf))));
+        }
         if let (None, PartKind::Mesh(mesh)) = (part.material, &part.kind) {
             for group in &mesh.groups {
                 runs.push((part.first_prim + group.first, named(&group.material).unwrap_or(0)));

@@ -4,6 +4,7 @@
 //! instance is the identity is traced without an upper tree.
 
 mod compile;
+mod solids;
 mod surface;
 
 use glam::DVec3;
@@ -14,6 +15,7 @@ pub use surface::Surface;
 use super::assembly::Assembly;
 use super::description::Shape;
 use crate::bvh::Tree;
+use crate::csg;
 use crate::lanes::Real;
 use crate::math::{Aabb, Affine};
 use crate::shape::{Block, Placed, Triangle, WorldSphere};
@@ -38,11 +40,13 @@ pub enum Class {
     Cone,
     /// Half-spaces: without bounds, kept in [`Object::unbounded`].
     HalfSpace,
+    /// Trees of solids ([`Object::solids`]).
+    Solids,
 }
 
 impl Class {
     /// All classes by number.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Triangle,
         Self::WorldSphere,
         Self::Sphere,
@@ -51,6 +55,7 @@ impl Class {
         Self::Cylinder,
         Self::Cone,
         Self::HalfSpace,
+        Self::Solids,
     ];
 
     fn of(shape: &Shape) -> Self {
@@ -80,6 +85,21 @@ pub struct Object<S> {
     pub placed: [Vec<Block<S, { Placed::FIELDS }>>; Class::ALL.len()],
     /// Half-spaces: tested for every ray.
     pub unbounded: Vec<Block<S, { Placed::FIELDS }>>,
+    /// Trees of solids.
+    pub solids: Vec<PlacedSolid<S>>,
+    /// Blocks of bounded trees of solids: indices into [`Object::solids`].
+    pub solid_blocks: Vec<Vec<u32>>,
+    /// Trees of solids without bounds: tested for every ray.
+    pub unbounded_solids: Vec<u32>,
+}
+
+/// A compiled tree of solids (or a part of one that touches no other part).
+#[derive(Clone, Debug)]
+pub struct PlacedSolid<S> {
+    /// What is traced.
+    pub solid: csg::Solid<S>,
+    /// Primitive number of leaf 0.
+    pub first_prim: u32,
 }
 
 /// An object placed in the world.
@@ -198,7 +218,10 @@ impl<S: Real> World<S> {
         for object in &self.objects {
             let q = object.tree.quality();
             let unbounded: usize = object.unbounded.iter().map(Block::len).sum();
-            stats.prims += (q.prims + unbounded) as u64;
+            // The tree holds each solid once, which stands for its leaves.
+            let held: usize = object.solid_blocks.iter().map(Vec::len).sum();
+            let leaves: usize = object.solids.iter().map(|s| s.solid.leaf_count()).sum();
+            stats.prims += (q.prims + unbounded + leaves - held) as u64;
             stats.nodes += q.nodes as u64;
             stats.leaves += q.leaves as u64;
             stats.depth = stats.depth.max(object.tree.depth);
@@ -221,11 +244,15 @@ impl<S: Real> World<S> {
 impl<S: Real> Object<S> {
     fn prim_bytes(&self) -> usize {
         let placed: usize = self.placed.iter().map(|list| size_of_val(&list[..])).sum();
-        size_of_val(&self.triangles[..]) + size_of_val(&self.spheres[..]) + placed + size_of_val(&self.unbounded[..])
+        size_of_val(&self.triangles[..])
+            + size_of_val(&self.spheres[..])
+            + placed
+            + size_of_val(&self.unbounded[..])
+            + self.solids.iter().map(|s| s.solid.bytes()).sum::<usize>()
     }
 
     /// Box of everything, infinite with half-spaces.
     pub fn bounds(&self) -> Aabb<S> {
-        if self.unbounded.is_empty() { self.tree.bounds } else { Aabb::EVERYTHING }
+        if self.unbounded.is_empty() && self.unbounded_solids.is_empty() { self.tree.bounds } else { Aabb::EVERYTHING }
     }
 }

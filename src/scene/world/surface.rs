@@ -2,19 +2,17 @@
 
 use glam::DVec3;
 
-use super::World;
+use super::{World, solids};
 use crate::lanes::Real;
 use crate::math::normal_to_world;
 use crate::scene::assembly::PartKind;
-use crate::scene::description::Shape;
-use crate::shape::{Cone, Cuboid, Cylinder, Disc, HalfSpace, Solid, Sphere};
 
 /// A hit point with what shading needs, f64, world space.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
     /// Hit point.
     pub position: DVec3,
-    /// Geometric normal, unit, as wound or outward; not turned towards the ray. Zero for degenerate geometry.
+    /// Geometric normal, unit, as wound or outward (of a tree of solids, out of the whole); not turned towards the ray. Zero for degenerate geometry.
     pub ng: DVec3,
     /// Index into the description's materials.
     pub material: u32,
@@ -37,7 +35,15 @@ impl<S: Real> World<S> {
             PartKind::Shape(shape) => {
                 let position = org + dir * t;
                 let local = to_world.inverse().transform_point3(position);
-                (position, normal_to_world(&to_world, local_normal(shape, local, u as u32)))
+                (position, normal_to_world(&to_world, solids::shape_normal(shape, local, u as u32)))
+            }
+            PartKind::Solids(tree) => {
+                let leaf = &tree.leaves[(prim - part.first_prim) as usize];
+                let position = org + dir * t;
+                let to_world = to_world * leaf.to_tree;
+                let local = to_world.inverse().transform_point3(position);
+                let outward = normal_to_world(&to_world, solids::solid_normal(&leaf.solid, local, u as u32));
+                (position, if v > 0.5 { -outward } else { outward })
             }
         };
         Surface { position, ng, material: self.material(placement.object, prim) }
@@ -47,16 +53,5 @@ impl<S: Real> World<S> {
         let runs = &self.materials[object as usize];
         let after = runs.partition_point(|(first, _)| *first <= prim);
         runs[after - 1].1
-    }
-}
-
-fn local_normal(shape: &Shape, point: DVec3, face: u32) -> DVec3 {
-    match *shape {
-        Shape::Sphere => Sphere::normal(point, face, 0.0),
-        Shape::HalfSpace => HalfSpace::normal(point, face, 0.0),
-        Shape::Disc => Disc::normal(point, face, 0.0),
-        Shape::Cuboid => Cuboid::normal(point, face, 0.0),
-        Shape::Cylinder => Cylinder::normal(point, face, 0.0),
-        Shape::Cone { top } => Cone::normal(point, face, top),
     }
 }

@@ -1,0 +1,220 @@
+//! Leaves: a kernel of the floor of shapes, the way into its local space, its box.
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::mesh::{Crossings, Mesh};
+use super::sweep::Events;
+use crate::lanes::{Lanes, Real};
+use crate::math::{Aabb, Affine, transformed_bounds};
+use crate::ray::Packet;
+use crate::ray::slab::Interval;
+use crate::shape::{self, Cone, Cuboid, Cylinder, HalfSpace, Solid as Canonical, Sphere};
+
+/// A canonical solid by its numbers.
+#[derive(Clone, Copy)]
+pub enum Form<'a> {
+    /// Unit sphere.
+    Sphere,
+    /// z <= 0.
+    HalfSpace,
+    /// [-1, 1]^3.
+    Cuboid,
+    /// Radius 1, 0 <= z <= 1.
+    Cylinder,
+    /// Radius 1 at z = 0, this one at z = 1.
+    Cone(f64),
+    /// Half-spaces `normal . p <= offset`.
+    Planes(&'a [(DVec3, f64)]),
+    /// See [`shape::quadric`].
+    Round([f64; 3]),
+    /// See [`shape::quadric`].
+    Trough([f64; 3]),
+    /// Major radius 1, the tube's radius.
+    Torus(f64),
+    /// Semi-axes at z = 1.
+    Taper([f64; 2]),
+    /// Corners of the triangles of a closed mesh, counter-clockwise seen from outside.
+    Mesh(&'a dyn Triangles),
+}
+
+/// Triangles one by one.
+pub trait Triangles: Sync {
+    /// How many.
+    fn count(&self) -> usize;
+    /// Corners of one.
+    fn corners(&self, i: usize) -> [DVec3; 3];
+}
+
+/// A leaf to be compiled.
+#[derive(Clone, Copy)]
+pub struct LeafInput<'a> {
+    /// Its canonical solid.
+    pub form: Form<'a>,
+    /// Box of the canonical solid, lower corner; infinite if it has none.
+    pub lo: DVec3,
+    /// Upper corner.
+    pub hi: DVec3,
+    /// Its space to the tree's.
+    pub to_tree: DAffine3,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Kind {
+    Sphere,
+    HalfSpace,
+    Cuboid,
+    Cylinder,
+    Cone,
+    /// Planes of the solid's list.
+    Planes {
+        first: u32,
+        count: u32,
+    },
+    Round,
+    Trough,
+    Torus,
+    Taper,
+    /// Index into the solid's meshes.
+    Mesh(u32),
+}
+
+/// A compiled leaf.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leaf<S> {
+    pub(super) kind: Kind,
+    pub(super) to_local: Affine<S>,
+    pub(super) params: [S; 3],
+    /// Where it can make a difference: its box, cut by those of the operations above it.
+    pub clip: Aabb<S>,
+}
+
+/// What leaves of unequal size keep outside of their records.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stores<S> {
+    /// Planes of polyhedra, in the tree's space: normal and offset.
+    pub planes: Vec<[S; 4]>,
+    /// Meshes.
+    pub meshes: Vec<Arc<Mesh<S>>>,
+}
+
+impl<S: Real> Leaf<S> {
+    /// Compiles `input`; `None` if its map overflows `S`.
+    pub fn new(input: &LeafInput, stores: &mut Stores<S>) -> Option<Self> {
+        let inverse = input.to_tree.inverse();
+        let to_local = Affine::<S>::from_f64(&inverse);
+        let finite = to_local.rows.as_flattened().iter().all(|x| x.is_finite());
+        let clip = bounds(&input.to_tree, input.lo, input.hi);
+        let three = |p: [f64; 3]| p.map(S::from_f64);
+        let (kind, params) = match input.form {
+            Form::Sphere => (Kind::Sphere, [S::ZERO; 3]),
+            Form::HalfSpace => (Kind::HalfSpace, [S::ZERO; 3]),
+            Form::Cuboid => (Kind::Cuboid, [S::ZERO; 3]),
+            Form::Cylinder => (Kind::Cylinder, [S::ZERO; 3]),
+            Form::Cone(top) if top >= 1.0 => (Kind::Cylinder, [S::ZERO; 3]),
+            Form::Cone(top) => (Kind::Cone, three([top, 0.0, 0.0])),
+            Form::Planes(list) => {
+                let first = stores.planes.len() as u32;
+                stores.planes.extend(list.iter().map(|plane| placed_plane(plane, &inverse)));
+                (Kind::Planes { first, count: list.len() as u32 }, [S::ZERO; 3])
+            }
+            Form::Round(profile) => (Kind::Round, three(profile)),
+            Form::Trough(profile) => (Kind::Trough, three(profile)),
+            Form::Torus(minor) => (Kind::Torus, three([minor, 0.0, 0.0])),
+            Form::Taper([x, y]) => (Kind::Taper, three([x, y, 0.0])),
+            Form::Mesh(triangles) => {
+                stores.meshes.push(Arc::new(placed_mesh(triangles, &input.to_tree)));
+                (Kind::Mesh(stores.meshes.len() as u32 - 1), [S::ZERO; 3])
+            }
+        };
+        let bounded = clip.is_bounded() || !(input.lo.is_finite() && input.hi.is_finite());
+        (finite && bounded).then_some(Self { kind, to_local, params, clip })
+    }
+
+    /// The same leaf with what it keeps outside in another place.
+    pub fn moved(&self, from: &Stores<S>, to: &mut Stores<S>) -> Self {
+        let kind = match self.kind {
+            Kind::Planes { first, count } => {
+                let planes = &from.planes[first as usize..][..count as usize];
+                let first = to.planes.len() as u32;
+                to.planes.extend_from_slice(planes);
+                Kind::Planes { first, count }
+            }
+            Kind::Mesh(index) => {
+                to.meshes.push(from.meshes[index as usize].clone());
+                Kind::Mesh(to.meshes.len() as u32 - 1)
+            }
+            other => other,
+        };
+        Self { kind, ..*self }
+    }
+
+    /// Adds the boundaries of this leaf in `lanes` to `events`; `within`: where the lines meet its box, give or take.
+    #[inline(always)]
+    pub fn boundaries<V: Lanes<Scalar = S>>(
+        &self,
+        packet: &Packet<V>,
+        within: &Interval<V>,
+        (stores, eps): (&Stores<S>, V),
+        (slot, lanes): (u32, u32),
+        (events, crossings): (&mut Events<S>, &mut Crossings),
+    ) {
+        if let Kind::Mesh(index) = self.kind {
+            let mesh = &stores.meshes[index as usize];
+            mesh.boundaries(packet, within, eps, (slot, lanes), crossings, events);
+            return;
+        }
+        let mut push = |span| events.push_span(slot, lanes, &span, within);
+        if let Kind::Planes { first, count } = self.kind {
+            let planes = &stores.planes[first as usize..][..count as usize];
+            push(shape::planes_span(packet.org, packet.dir, planes));
+            return;
+        }
+        let (o, d) = (self.to_local.points(packet.org), self.to_local.vectors(packet.dir));
+        let p = self.params;
+        match self.kind {
+            Kind::Sphere => push(Sphere::span(o, d, p[0])),
+            Kind::HalfSpace => push(HalfSpace::span(o, d, p[0])),
+            Kind::Cuboid => push(Cuboid::span(o, d, p[0])),
+            Kind::Cylinder => push(Cylinder::span(o, d, p[0])),
+            Kind::Cone => push(Cone::span(o, d, p[0])),
+            Kind::Round => shape::quadric::round(o, d, p, push),
+            Kind::Trough => shape::quadric::trough(o, d, p, push),
+            Kind::Torus => shape::torus(o, d, p[0], push),
+            Kind::Taper => shape::taper(o, d, [p[0], p[1]], push),
+            Kind::Planes { .. } | Kind::Mesh(_) => {}
+        }
+    }
+}
+
+/// A mesh in the tree's space; a mirroring map turns its triangles round.
+fn placed_mesh<S: Real>(triangles: &dyn Triangles, to_tree: &DAffine3) -> Mesh<S> {
+    let mirrored = to_tree.matrix3.determinant() < 0.0;
+    Mesh::new((0..triangles.count()).map(|i| {
+        let [a, b, c] = triangles.corners(i).map(|p| to_tree.transform_point3(p));
+        if mirrored { [a, c, b] } else { [a, b, c] }
+    }))
+}
+
+/// A plane of the canonical space in the tree's: it is the same set of points.
+fn placed_plane<S: Real>((normal, offset): &(DVec3, f64), to_local: &DAffine3) -> [S; 4] {
+    let turned = to_local.matrix3.transpose() * *normal;
+    let offset = offset - normal.dot(to_local.translation);
+    // Unit normals keep the numbers of a plane in range, whatever the map's scale.
+    let length = turned.length();
+    let [x, y, z] = (turned / length).to_array().map(S::from_f64);
+    [x, y, z, S::from_f64(offset / length)]
+}
+
+/// Box in the tree's space, widened by the rounding of the map.
+fn bounds<S: Real>(to_tree: &DAffine3, lo: DVec3, hi: DVec3) -> Aabb<S> {
+    let (lo, hi) = transformed_bounds(to_tree, lo, hi);
+    let finite = |p: DVec3| DVec3::from_array(p.to_array().map(|x| if x.is_finite() { x } else { 0.0 }));
+    let size = finite(lo).abs().max(finite(hi).abs()).max(to_tree.translation.abs()).max_element();
+    let slack = DVec3::splat(size * 16.0 * S::EPSILON.to_f64());
+    let wide = Aabb::enclosing(lo - slack, hi + slack);
+    let whole = Aabb::<S>::EVERYTHING;
+    // A half-space turned about an axis has sides of infinity on some axes only: it goes without a box.
+    if wide.is_bounded() { wide } else { whole }
+}

@@ -1,0 +1,156 @@
+//! A compiled solid: leaves, operations, bounds, and a tree over the leaves' boxes where there are many.
+
+use super::leaf::{Leaf, Stores};
+use super::mesh::Crossings;
+use super::prune::Met;
+use super::sweep::Events;
+use super::tree::Tree;
+use crate::bvh;
+use crate::lanes::{LaneMask, Lanes, Real};
+use crate::math::Aabb;
+use crate::ray::Packet;
+use crate::ray::slab::Interval;
+
+/// Boundaries closer than this many roundings of the coordinates are one: 16 half ulps.
+const ROUNDINGS: f64 = 16.0;
+/// Layers of leaves in the first part of a line.
+const LAYERS: f64 = 4.0;
+/// More bounded leaves than this are searched by a tree.
+pub(super) const LINEAR: usize = 24;
+
+/// One solid, ready to be traced.
+#[derive(Clone, Debug)]
+pub struct Solid<S> {
+    pub(super) tree: Tree,
+    pub(super) leaves: Vec<Leaf<S>>,
+    /// Numbers of the leaves in the program it was compiled from.
+    pub(super) numbers: Vec<u32>,
+    pub(super) stores: Stores<S>,
+    /// Outside of this box there is nothing; infinite where a complement reaches everywhere.
+    pub bounds: Aabb<S>,
+    /// Largest coordinate of the bounded leaves' boxes.
+    pub(super) size: S,
+    /// Least distance of two boundaries, in the tree's space.
+    pub(super) least: S,
+    /// Tree over the boxes of bounded leaves, and its blocks; empty for small solids.
+    pub(super) search: Option<(bvh::Tree<S>, Vec<Vec<u32>>)>,
+    /// Leaves that the tree does not hold.
+    pub(super) always: Vec<u32>,
+}
+
+impl<S: Real> Solid<S> {
+    /// Number of leaf `leaf` of a [`super::Boundary`] in the program that this solid was compiled from.
+    #[inline(always)]
+    pub fn number(&self, leaf: u32) -> u32 {
+        self.numbers[leaf as usize]
+    }
+
+    /// Whether it is everything but a part of space: inside where no leaf is met.
+    pub fn reaches_everywhere(&self) -> bool {
+        self.tree.nodes[0].default
+    }
+
+    /// Number of leaves.
+    pub fn leaf_count(&self) -> usize {
+        self.leaves.len()
+    }
+
+    /// Bytes of leaves, operations and trees.
+    pub fn bytes(&self) -> usize {
+        let (tree, blocks) = self.search.as_ref().map_or((0, 0), |(tree, blocks)| {
+            (size_of_val(&tree.nodes[..]), blocks.iter().map(|b| size_of_val(&b[..])).sum())
+        });
+        let own = size_of_val(&self.leaves[..]) + size_of_val(&self.stores.planes[..]) + size_of_val(&self.numbers[..]);
+        own + self.stores.meshes.iter().map(|m| m.bytes()).sum::<usize>() + self.tree.bytes() + tree + blocks
+    }
+
+    /// Difference of t below which two boundaries of a lane are one. It depends on the lane's line only.
+    #[inline(always)]
+    pub(super) fn tolerance<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>) -> V {
+        let largest = |v: [V; 3]| v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs());
+        let reach = largest(packet.org) + V::splat(self.size);
+        let distance = (reach * V::constant(ROUNDINGS * S::EPSILON.to_f64())).fast_max(V::splat(self.least));
+        distance / largest(packet.dir)
+    }
+
+    /// Share of a line's way through the solid that is looked at first: a few layers of leaves, were they spread evenly.
+    pub(super) fn front(&self) -> f64 {
+        if self.search.is_none() || !self.bounds.is_bounded() {
+            1.0
+        } else {
+            LAYERS / (self.leaves.len() as f64).cbrt()
+        }
+    }
+
+    /// Lists the leaves that some of `lanes` meet between the segment's start and `reach`, give or take, each once.
+    #[inline(always)]
+    pub(super) fn meet<V: Lanes<Scalar = S>>(
+        &self,
+        packet: &Packet<V>,
+        lanes: u32,
+        eps: V,
+        reach: V,
+        met: &mut Vec<Met>,
+        stack: &mut Vec<(u32, u32)>,
+    ) {
+        met.clear();
+        let (start, end) = (packet.t_min - (eps + eps), reach + (eps + eps));
+        let meets = |bounds: &Aabb<S>| {
+            let interval = Interval::of(packet, bounds.lo, bounds.hi);
+            let (near, far) = (interval.near, interval.far);
+            (near.cmp_le(far) & start.cmp_le(far) & near.cmp_le(end)).bits()
+        };
+        let mut take = |leaf: u32, lanes: u32| {
+            let lanes = meets(&self.leaves[leaf as usize].clip) & lanes;
+            if lanes != 0 {
+                met.push(Met { leaf, lanes });
+            }
+        };
+        for &leaf in &self.always {
+            take(leaf, lanes);
+        }
+        let Some((tree, blocks)) = &self.search else { return };
+        if tree.nodes.is_empty() {
+            return;
+        }
+        stack.clear();
+        stack.push((0, lanes));
+        while let Some((node, lanes)) = stack.pop() {
+            let node = &tree.nodes[node as usize];
+            for slot in 0..node.used as usize {
+                let lanes = meets(&node.child_bounds(slot)) & lanes;
+                if lanes == 0 {
+                    continue;
+                }
+                let child = node.child(slot);
+                if child.is_leaf() {
+                    blocks[child.index as usize].iter().for_each(|&leaf| take(leaf, lanes));
+                } else {
+                    stack.push((child.index, lanes));
+                }
+            }
+        }
+    }
+
+    /// Adds the boundaries of a leaf, unless it lies beyond `limit` in all lanes. `eps`: the tolerance.
+    #[inline(always)]
+    pub(super) fn boundaries<V: Lanes<Scalar = S>>(
+        &self,
+        packet: &Packet<V>,
+        met: &Met,
+        slot: u32,
+        limit: V,
+        eps: V,
+        events: &mut Events<S>,
+        crossings: &mut Crossings,
+    ) {
+        let slack = eps + eps;
+        let leaf = &self.leaves[met.leaf as usize];
+        let within = Interval::of(packet, leaf.clip.lo, leaf.clip.hi);
+        let within = Interval { near: within.near - slack, far: within.far + slack };
+        // Groups of boundaries that begin before the limit end less than `slack` after it.
+        if within.near.cmp_le(limit + slack).bits() & met.lanes != 0 {
+            leaf.boundaries(packet, &within, (&self.stores, eps), (slot, met.lanes), (events, crossings));
+        }
+    }
+}

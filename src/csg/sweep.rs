@@ -1,0 +1,342 @@
+//! The event sweep: all boundaries of the leaves that matter, nearest first, toggle bits; where the whole solid
+//! changes from outside to inside or back is its boundary.
+//!
+//! Boundaries of a lane closer together than its tolerance are taken as one event, so that faces which touch and tangent
+//! lines leave no skin. Groups form from the start of the line on, whatever the segment is, and depend on the line
+//! alone. Sources: Roth, "Ray casting for modeling solids", 1982 (boundaries per line); Lefebvre, "IceSL: A GPU
+//! accelerated CSG modeler and slicer", 2013 (sweep over sorted boundaries with early end).
+
+use super::mesh::Crossings;
+use super::prune::{Met, Program, Pruner};
+use super::solid::Solid;
+use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
+use crate::ray::Packet;
+use crate::ray::slab::Interval;
+use crate::shape::Span;
+
+/// What a packet needs while it sweeps; grows on use, for any solid.
+#[derive(Debug, Default)]
+pub struct Scratch<S> {
+    met: Vec<Met>,
+    pruner: Pruner,
+    program: Program,
+    events: Events<S>,
+    inside: Vec<u32>,
+    toggled: Vec<Toggled>,
+    stack: Vec<(u32, u32)>,
+    crossings: Crossings,
+}
+
+/// Boundaries of leaves: `MAX_LANES` numbers each.
+#[derive(Debug, Default)]
+pub struct Events<S> {
+    t: Vec<S>,
+    face: Vec<S>,
+    /// Place in the program of the leaf each belongs to.
+    leaf: Vec<u32>,
+    count: usize,
+}
+
+/// An event that was taken.
+#[derive(Clone, Copy, Debug)]
+struct Toggled {
+    event: u32,
+    lanes: u32,
+}
+
+/// Where lanes cross the surface of a solid.
+#[derive(Clone, Copy, Debug)]
+pub struct Boundary<V> {
+    /// Lanes that do.
+    pub lanes: u32,
+    /// Ray parameter.
+    pub t: V,
+    /// Face of the leaf.
+    pub face: V,
+    /// Lanes that enter the solid.
+    pub enters: u32,
+    /// Lanes where the leaf's own normal points into the solid: its surface was subtracted.
+    pub turned: u32,
+    /// The leaf whose surface it is.
+    pub leaf: u32,
+}
+
+/// What a sweep did.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Effort {
+    /// Leaves whose box some lane meets.
+    pub met: usize,
+    /// Leaves left after pruning.
+    pub kept: usize,
+    /// Boundaries of leaves, vectors of lanes.
+    pub events: usize,
+    /// Steps of the sweep.
+    pub steps: usize,
+}
+
+impl<S: Real> Events<S> {
+    fn clear(&mut self) {
+        self.leaf.clear();
+        self.count = 0;
+    }
+
+    /// Adds one boundary of `leaf` in `lanes`.
+    #[inline(always)]
+    pub fn push<V: Lanes<Scalar = S>>(&mut self, leaf: u32, lanes: V::Mask, t: V, face: V) {
+        let at = self.count * MAX_LANES;
+        self.count += 1;
+        if self.t.len() < at + MAX_LANES {
+            self.t.resize(at + MAX_LANES, S::ZERO);
+            self.face.resize(at + MAX_LANES, S::ZERO);
+        }
+        V::select(lanes, t, V::splat(S::INFINITY)).store(&mut self.t[at..]);
+        face.store(&mut self.face[at..]);
+        self.leaf.push(leaf);
+    }
+
+    /// Adds both boundaries of a span in the lanes of `lanes`. Those that lie outside of the leaf's box, by more than rounding,
+    /// go to infinity: there the leaf makes no difference, and a boundary must not count where it is not.
+    #[inline(always)]
+    pub fn push_span<V: Lanes<Scalar = S>>(&mut self, leaf: u32, lanes: u32, span: &Span<V>, within: &Interval<V>) {
+        let (before, after) = (-V::splat(S::INFINITY), V::splat(S::INFINITY));
+        let settled = |t: V| {
+            let t = V::select(t.cmp_lt(within.near), before, t);
+            V::select(within.far.cmp_lt(t), after, t)
+        };
+        let (t_in, t_out) = (settled(span.t_in), settled(span.t_out));
+        // Both or none; NaN is none.
+        let both = span.hit & t_in.cmp_le(t_out) & V::Mask::from_bits(lanes);
+        if both.any() {
+            self.push(leaf, both, t_in, span.face_in);
+            self.push(leaf, both, t_out, span.face_out);
+        }
+    }
+
+    #[inline(always)]
+    fn time<V: Lanes<Scalar = S>>(&self, event: usize) -> V {
+        V::load(&self.t[event * MAX_LANES..])
+    }
+}
+
+/// How much of the lines' way through a solid is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// All of it: for who wants every boundary.
+    Whole,
+    /// The front part first, then more, as long as lanes need it: for who wants the first boundary. What was reported may
+    /// be reported again.
+    FrontFirst,
+}
+
+/// Reports the boundaries of `solid` on the packet's lines in order of t to `found`, which returns the lanes that need no
+/// more. `limit` is how far lanes look at most; `lanes` are those whose line meets the solid's box, in `interval`.
+#[inline(always)]
+pub fn sweep<V: Lanes>(
+    solid: &Solid<V::Scalar>,
+    packet: &Packet<V>,
+    (lanes, interval): (u32, &Interval<V>),
+    limit: V,
+    depth: Depth,
+    scratch: &mut Scratch<V::Scalar>,
+    mut found: impl FnMut(&Boundary<V>) -> u32,
+) -> Effort {
+    let mut effort = Effort::default();
+    let mut share = if depth == Depth::Whole { 1.0 } else { solid.front() };
+    let start = interval.near.fast_max(packet.t_min);
+    let mut lanes = lanes;
+    loop {
+        // Parts are shares of the lane's own way, so that they are the same in a packet of any width.
+        let part = (interval.far - start) * V::constant(share) + start;
+        let whole = share >= 1.0;
+        let reach = if whole { V::splat(V::Scalar::INFINITY) } else { part };
+        let mut done = 0;
+        effort += pass(solid, packet, lanes, limit.fast_min(reach), reach, scratch, |boundary| {
+            let lanes = found(boundary);
+            done |= lanes;
+            lanes
+        });
+        lanes &= !done & reach.cmp_lt(limit).bits();
+        if whole || lanes == 0 {
+            return effort;
+        }
+        share *= 4.0;
+    }
+}
+
+impl std::ops::AddAssign for Effort {
+    fn add_assign(&mut self, o: Self) {
+        self.met += o.met;
+        self.kept += o.kept;
+        self.events += o.events;
+        self.steps += o.steps;
+    }
+}
+
+/// One sweep over the leaves that begin before `reach`.
+#[inline(always)]
+fn pass<V: Lanes>(
+    solid: &Solid<V::Scalar>,
+    packet: &Packet<V>,
+    lanes: u32,
+    limit: V,
+    reach: V,
+    scratch: &mut Scratch<V::Scalar>,
+    mut found: impl FnMut(&Boundary<V>) -> u32,
+) -> Effort {
+    let mut effort = Effort::default();
+    let eps = solid.tolerance(packet);
+    let limit = limit.fast_min(V::splat(V::Scalar::MAX));
+    let Scratch { met, pruner, program, events, inside, toggled, stack, crossings } = scratch;
+    solid.meet(packet, lanes, eps, reach, met, stack);
+    effort.met = met.len();
+    pruner.prune(&solid.tree, met, program);
+    effort.kept = met.len();
+    events.clear();
+    inside.clear();
+    inside.resize(met.len(), 0);
+    let mut state = program.run(inside);
+    if met.is_empty() {
+        return effort;
+    }
+    let mut pending = 0;
+    for (slot, m) in met.iter().enumerate() {
+        pending |= m.lanes;
+        solid.boundaries(packet, m, slot as u32, limit, eps, events, crossings);
+    }
+    effort.events = events.count;
+    pending &= lanes;
+    loop {
+        let mut next = V::splat(V::Scalar::INFINITY);
+        for event in 0..events.count {
+            next = events.time::<V>(event).fast_min(next);
+        }
+        pending &= next.cmp_le(limit).bits();
+        if pending == 0 {
+            return effort;
+        }
+        effort.steps += 1;
+        let until = next + eps;
+        let (mut once, mut twice) = (0, 0);
+        toggled.clear();
+        for event in 0..events.count {
+            let lanes = events.time::<V>(event).cmp_le(until).bits() & pending;
+            if lanes != 0 {
+                inside[events.leaf[event] as usize] ^= lanes;
+                toggled.push(Toggled { event: event as u32, lanes });
+                twice |= once & lanes;
+                once |= lanes;
+            }
+        }
+        let now = program.run(inside);
+        let changed = (now ^ state) & pending;
+        state ^= changed;
+        if changed != 0 {
+            let step = Step { met, inside, events, toggled, now };
+            pending &= !step.plain(changed & !twice, &mut found);
+            let mut rest = changed & twice;
+            while rest != 0 {
+                let lane = rest & rest.wrapping_neg();
+                rest &= !lane;
+                if let Some(boundary) = several::<V>(met, inside, events, toggled, program, now, lane) {
+                    pending &= !found(&boundary);
+                }
+            }
+        }
+        for Toggled { event, lanes } in toggled.iter() {
+            let at = *event as usize * MAX_LANES;
+            let taken = V::Mask::from_bits(*lanes);
+            let t = V::load(&events.t[at..]);
+            V::select(taken, V::splat(V::Scalar::INFINITY), t).store(&mut events.t[at..]);
+        }
+    }
+}
+
+/// One step of the sweep after its toggles.
+struct Step<'a, S> {
+    met: &'a [Met],
+    inside: &'a [u32],
+    events: &'a Events<S>,
+    toggled: &'a [Toggled],
+    now: u32,
+}
+
+impl<S: Real> Step<'_, S> {
+    /// Reports lanes in which one event toggled: its leaf's surface is seen. Returns those that need no more.
+    #[inline(always)]
+    fn plain<V: Lanes<Scalar = S>>(&self, changed: u32, found: &mut impl FnMut(&Boundary<V>) -> u32) -> u32 {
+        let mut done = 0;
+        for Toggled { event, lanes } in self.toggled {
+            let lanes = lanes & changed;
+            if lanes != 0 {
+                done |= found(&boundary(self.met, self.inside, self.events, *event, lanes, self.now));
+            }
+        }
+        done
+    }
+}
+
+fn boundary<V: Lanes>(
+    met: &[Met],
+    inside: &[u32],
+    events: &Events<V::Scalar>,
+    event: u32,
+    lanes: u32,
+    now: u32,
+) -> Boundary<V> {
+    let slot = events.leaf[event as usize] as usize;
+    let at = event as usize * MAX_LANES;
+    Boundary {
+        lanes,
+        t: V::load(&events.t[at..]),
+        face: V::load(&events.face[at..]),
+        enters: now & lanes,
+        turned: (now ^ inside[slot]) & lanes,
+        leaf: met[slot].leaf,
+    }
+}
+
+/// The boundary of one lane in which several events toggled at once: of the leaves whose own surface bounds the
+/// solid there, before or after, the first one.
+#[cold]
+#[inline(never)]
+fn several<V: Lanes>(
+    met: &[Met],
+    inside: &mut [u32],
+    events: &Events<V::Scalar>,
+    toggled: &[Toggled],
+    program: &mut Program,
+    now: u32,
+    lane: u32,
+) -> Option<Boundary<V>> {
+    let own = || toggled.iter().filter(|t| t.lanes & lane != 0);
+    let slot = |t: &Toggled| events.leaf[t.event as usize] as usize;
+    // A leaf that was entered and left again did not change.
+    let odd = |s: usize| own().filter(|t| slot(t) == s).count() % 2 == 1;
+    let flip_all = |inside: &mut [u32]| own().for_each(|t| inside[slot(t)] ^= lane);
+    let candidates: Vec<(u32, usize)> = own().filter(|t| odd(slot(t))).map(|t| (t.event, slot(t))).collect();
+    let bounds = |inside: &mut [u32], program: &mut Program, s: usize, value: u32| {
+        inside[s] ^= lane;
+        let other = program.run(inside);
+        inside[s] ^= lane;
+        (other ^ value) & lane != 0
+    };
+    // The smallest leaf number: `met` is in the order of a search, which packets of another width may do otherwise.
+    let mut best: Option<(bool, u32, u32)> = None;
+    for &(event, s) in &candidates {
+        let mut seen = bounds(inside, program, s, now);
+        if !seen {
+            flip_all(inside);
+            seen = bounds(inside, program, s, !now);
+            flip_all(inside);
+        }
+        let key = (!seen, met[s].leaf, event);
+        best = Some(best.map_or(key, |b| b.min(key)));
+    }
+    let (_, leaf, _) = best?;
+    // Of its events the nearest one.
+    let (event, _) = candidates.iter().filter(|(_, s)| met[*s].leaf == leaf).min_by(|(a, _), (b, _)| {
+        let at = |e: u32| events.t[e as usize * MAX_LANES + lane.trailing_zeros() as usize].to_f64();
+        at(*a).total_cmp(&at(*b))
+    })?;
+    Some(boundary(met, inside, events, *event, lane, now))
+}

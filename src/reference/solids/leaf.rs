@@ -1,0 +1,312 @@
+//! Where a line is inside one leaf: intervals in order of t, f64.
+//!
+//! Convex shapes and quadrics as in the floor's own shapes; polyhedra by clipping; the torus by its distance function,
+//! which no expansion into powers of t can match in digits; the tapered solid by a quartic about the line's nearest
+//! point, its roots parted by those of the derivatives.
+
+use glam::DVec3;
+
+use super::super::shapes;
+use super::super::spans::{self, Crossing, Span};
+use crate::scene::description::Shape;
+use crate::scene::mesh::Mesh;
+use crate::scene::solids::{Polyhedron, Solid};
+
+/// Crossings of a mesh closer than this relative to coordinates are one.
+const SAME_EDGE: f64 = 1e-13;
+/// Intervals shorter than this (units of the canonical solid) are looked through no further.
+const FINEST: f64 = 1e-7;
+
+/// Entry and exit of each interval, in order; ends may be infinite.
+pub(super) fn intervals(solid: &Solid, org: DVec3, dir: DVec3) -> Vec<Span> {
+    match solid {
+        Solid::Shape(Shape::HalfSpace) => half_space(org.z, dir.z, 0.0).into_iter().collect(),
+        Solid::Shape(shape) => match shapes::crossings(*shape, org, dir) {
+            [Some(enter), Some(leave)] => vec![Span { enter, leave }],
+            _ => Vec::new(),
+        },
+        Solid::Polyhedron(polyhedron) => clipped(polyhedron, org, dir).into_iter().collect(),
+        Solid::Torus { minor } => torus(*minor, org, dir),
+        Solid::Taper { x, y } => taper([*x, *y], org, dir),
+        Solid::Round { profile } => curved(*profile, false, org, dir),
+        Solid::Trough { profile } => curved(*profile, true, org, dir),
+        Solid::Mesh(mesh) => meshed(mesh, org, dir),
+    }
+}
+
+/// Outward normal at a point of a face, canonical space, unnormalised.
+pub(super) fn normal(solid: &Solid, face: u32, p: DVec3) -> DVec3 {
+    let ends = [DVec3::NEG_Z, DVec3::Z, DVec3::NEG_X, DVec3::X];
+    let end = |face: u32| ends.get(face as usize - 1).copied().unwrap_or(DVec3::Z);
+    match solid {
+        Solid::Shape(shape) => shapes::normal(*shape, face, p),
+        Solid::Polyhedron(polyhedron) => polyhedron.planes().get(face as usize).map_or(DVec3::Z, |q| q.normal),
+        Solid::Torus { .. } => p - DVec3::new(p.x, p.y, 0.0).normalize_or(DVec3::X),
+        Solid::Taper { .. } | Solid::Round { .. } | Solid::Trough { .. } if face > 0 => end(face),
+        Solid::Taper { x, y } => {
+            // Of (x / a)^2 + (y / b)^2 - 1.
+            let (a, b) = (1.0 + (x - 1.0) * p.z, 1.0 + (y - 1.0) * p.z);
+            let along = -(p.x * p.x * (x - 1.0) / a.powi(3) + p.y * p.y * (y - 1.0) / b.powi(3));
+            DVec3::new(p.x / (a * a), p.y / (b * b), along)
+        }
+        Solid::Round { profile: [_, g1, g2] } => DVec3::new(2.0 * p.x, 2.0 * p.y, -(g1 + 2.0 * g2 * p.z)),
+        Solid::Trough { profile: [_, g1, g2] } => DVec3::new(0.0, 2.0 * p.y, -(g1 + 2.0 * g2 * p.z)),
+        Solid::Mesh(mesh) => {
+            let [a, b, c] = mesh.corners(face as usize);
+            shapes::cross(b - a, c - a)
+        }
+    }
+}
+
+/// The inside of a closed mesh, by the number of surfaces around a point: every crossing adds or takes one, and a crossing of
+/// an edge, seen by the triangles on both its sides, counts once.
+fn meshed(mesh: &Mesh, org: DVec3, dir: DVec3) -> Vec<Span> {
+    let mut ends: Vec<(f64, bool, u32)> = Vec::new();
+    for i in 0..mesh.triangles.len() {
+        let corners = mesh.corners(i);
+        if let Some(hit) = shapes::triangle(corners, org, dir).filter(|_| shapes::is_proper(corners)) {
+            ends.push((hit.t, hit.ng.dot(dir) < 0.0, i as u32));
+        }
+    }
+    ends.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+    let size = mesh.bounds().map_or(0.0, |(lo, hi)| lo.abs().max(hi.abs()).max_element()) + org.abs().max_element();
+    let apart = SAME_EDGE * size / dir.length();
+    let mut spans: Vec<Span> = Vec::new();
+    let mut entered: Option<(f64, u32)> = None;
+    for group in ends.chunk_by(|a, b| b.0 - a.0 <= apart) {
+        let (t, _, face) = group[0];
+        let way = |enters: bool| group.iter().any(|e| e.1 == enters);
+        match (entered, way(true), way(false)) {
+            (None, true, false) => entered = Some((t, face)),
+            (Some((t_in, face_in)), false, true) => {
+                spans.push(Span::new(t_in, t, face_in, face));
+                entered = None;
+            }
+            _ => {}
+        }
+    }
+    spans
+}
+
+/// Where `n . p <= d` with `at` = n . org - d and `speed` = n . dir.
+fn half_space(at: f64, speed: f64, face: f64) -> Option<Span> {
+    let face = face as u32;
+    let t = -at / speed;
+    match speed {
+        s if s > 0.0 => Some(Span::new(f64::NEG_INFINITY, t, face, face)),
+        s if s < 0.0 => Some(Span::new(t, f64::INFINITY, face, face)),
+        _ => (at <= 0.0).then(Span::all),
+    }
+}
+
+fn clipped(polyhedron: &Polyhedron, org: DVec3, dir: DVec3) -> Option<Span> {
+    let mut span = Span::all();
+    for (i, plane) in polyhedron.planes().iter().enumerate() {
+        let at = plane.normal.dot(org) - plane.offset;
+        span = span.and(half_space(at, plane.normal.dot(dir), i as f64)?)?;
+    }
+    Some(span)
+}
+
+/// Quadrics between slabs; `drawn`: along x.
+fn curved([g0, g1, g2]: [f64; 3], drawn: bool, org: DVec3, dir: DVec3) -> Vec<Span> {
+    // From the middle of the slab or of the line's way near the axis: far away the quadratic would cancel.
+    let flat = |v: DVec3| if drawn { DVec3::new(0.0, v.y, v.z) } else { v };
+    let shift = -flat(org).dot(flat(dir)) / flat(dir).dot(flat(dir));
+    let shift = if shift.is_finite() { shift } else { 0.0 };
+    let org = org + shift * dir;
+    let squares = |p: DVec3, q: DVec3| if drawn { p.y * q.y } else { p.x * q.x + p.y * q.y };
+    let a = squares(dir, dir) - g2 * dir.z * dir.z;
+    let b = squares(org, dir) - 0.5 * (g1 + 2.0 * g2 * org.z) * dir.z;
+    let c = squares(org, org) - (g0 + g1 * org.z + g2 * org.z * org.z);
+    let mut ends = spans::slab(org.z, dir.z, 0.0, 1.0, 1, 2);
+    if drawn {
+        ends = ends.and_then(|ends| spans::slab(org.x, dir.x, -1.0, 1.0, 3, 4)?.and(ends));
+    }
+    let Some(ends) = ends else { return Vec::new() };
+    let pieces = spans::quadric(a, b, c).into_iter().flatten();
+    pieces.filter_map(|side| side.and(ends)).map(|s| s.moved(shift)).collect()
+}
+
+/// The torus is where the distance to its circle is at most the tube's radius. The distance changes along the line no
+/// faster than the line moves, so an interval whose middle is farther from the surface than half its length has no
+/// boundary in it.
+fn torus(minor: f64, org: DVec3, dir: DVec3) -> Vec<Span> {
+    let speed = dir.length();
+    let middle = -org.dot(dir) / (speed * speed);
+    let near = org + middle * dir;
+    let reach = 1.0 + minor + 1e-3;
+    let room = reach * reach - near.length_squared();
+    if room <= 0.0 {
+        return Vec::new();
+    }
+    let unit = dir / speed;
+    let depth = |s: f64| {
+        let p = near + s * unit;
+        (p.x.hypot(p.y) - 1.0).hypot(p.z) - minor
+    };
+    let mut roots = Vec::new();
+    let mut open = vec![(-room.sqrt(), room.sqrt())];
+    while let Some((a, b)) = open.pop() {
+        let middle = 0.5 * (a + b);
+        if depth(middle).abs() > 0.5 * (b - a) * (1.0 + 1e-9) {
+            continue;
+        }
+        if b - a > FINEST {
+            // Later parts first: the earlier ones come off the stack first.
+            open.extend([(middle, b), (a, middle)]);
+        } else if (depth(a) <= 0.0) != (depth(b) <= 0.0) {
+            roots.push(bisected(&depth, a, b));
+        }
+    }
+    let at = |s: f64| middle + s / speed;
+    roots.chunks_exact(2).map(|pair| Span::new(at(pair[0]), at(pair[1]), 0, 0)).collect()
+}
+
+/// The sign change of `f` between `a` and `b`.
+fn bisected(f: &impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+    let below = f(a) <= 0.0;
+    for _ in 0..200 {
+        let middle = 0.5 * (a + b);
+        if middle <= a || middle >= b {
+            break;
+        }
+        if (f(middle) <= 0.0) == below { a = middle } else { b = middle }
+    }
+    0.5 * (a + b)
+}
+
+/// Between the ends the solid is where x^2 b(z)^2 + y^2 a(z)^2 <= a(z)^2 b(z)^2.
+fn taper([x, y]: [f64; 2], org: DVec3, dir: DVec3) -> Vec<Span> {
+    let ends = spans::slab(org.z, dir.z, 0.0, 1.0, 1, 2);
+    let wide = |top: f64| 1.01 * top.max(1.0);
+    let x_slab = spans::slab(org.x, dir.x, -wide(x), wide(x), 9, 9);
+    let y_slab = spans::slab(org.y, dir.y, -wide(y), wide(y), 9, 9);
+    let within = ends.zip(x_slab).zip(y_slab).and_then(|((e, x), y)| e.and(x)?.and(y));
+    let Some(within) = within else { return Vec::new() };
+    let (from, length) = (within.enter.t, within.leave.t - within.enter.t);
+    if !(length > 0.0 && length.is_finite()) {
+        return Vec::new();
+    }
+    let (o, d) = (org + from * dir, dir * length);
+    let linear = |c0: f64, c1: f64| vec![c0, c1];
+    let (a, b) = (linear(1.0 + (x - 1.0) * o.z, (x - 1.0) * d.z), linear(1.0 + (y - 1.0) * o.z, (y - 1.0) * d.z));
+    let (px, py) = (linear(o.x, d.x), linear(o.y, d.y));
+    let square = |p: &[f64], q: &[f64]| {
+        let product = times(p, q);
+        times(&product, &product)
+    };
+    let (u, v, w) = (square(&px, &b), square(&py, &a), square(&a, &b));
+    let p: Vec<f64> = (0..5).map(|k| u[k] + v[k] - w[k]).collect();
+    let inside = |s: f64| value(&p, s) <= 0.0;
+    let mut cuts = roots(&p);
+    cuts.insert(0, 0.0);
+    cuts.push(1.0);
+    let end = |s: f64, there: Crossing| match s {
+        0.0 | 1.0 => there,
+        _ => Crossing { t: from + s * length, face: 0 },
+    };
+    let mut found: Vec<Span> = Vec::new();
+    for pair in cuts.windows(2).filter(|p| p[1] > p[0] && inside(0.5 * (p[0] + p[1]))) {
+        let span = Span { enter: end(pair[0], within.enter), leave: end(pair[1], within.leave) };
+        match found.last_mut() {
+            Some(last) if last.leave.t == span.enter.t => last.leave = span.leave,
+            _ => found.push(span),
+        }
+    }
+    found
+}
+
+fn times(p: &[f64], q: &[f64]) -> Vec<f64> {
+    let mut product = vec![0.0; p.len() + q.len() - 1];
+    for (i, a) in p.iter().enumerate() {
+        for (j, b) in q.iter().enumerate() {
+            product[i + j] += a * b;
+        }
+    }
+    product
+}
+
+fn value(p: &[f64], s: f64) -> f64 {
+    p.iter().rev().fold(0.0, |sum, c| sum * s + c)
+}
+
+/// Sign changes of a polynomial in 0..1, ascending.
+fn roots(p: &[f64]) -> Vec<f64> {
+    let mut derivatives = vec![p.to_vec()];
+    while let Some(last) = derivatives.last().filter(|p| p.len() > 2) {
+        let next = last.iter().enumerate().skip(1).map(|(i, c)| i as f64 * c).collect();
+        derivatives.push(next);
+    }
+    let mut found: Vec<f64> = Vec::new();
+    for p in derivatives.iter().rev() {
+        let mut cuts = vec![0.0];
+        cuts.append(&mut found);
+        cuts.push(1.0);
+        let f = |s: f64| value(p, s);
+        found = cuts
+            .windows(2)
+            .filter(|c| (f(c[0]) <= 0.0) != (f(c[1]) <= 0.0))
+            .map(|c| bisected(&f, c[0], c[1]))
+            .collect();
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::solids::torus as placed_torus;
+
+    fn ts(solid: &Solid, org: [f64; 3], dir: [f64; 3]) -> Vec<(f64, f64)> {
+        intervals(solid, org.into(), dir.into()).iter().map(|s| (s.enter.t, s.leave.t)).collect()
+    }
+
+    fn close(got: &[(f64, f64)], want: &[(f64, f64)]) {
+        let near = |g: f64, w: f64| g == w || (g - w).abs() < 1e-12;
+        let all = got.len() == want.len() && got.iter().zip(want).all(|(g, w)| near(g.0, w.0) && near(g.1, w.1));
+        assert!(all, "{got:?} {want:?}");
+    }
+
+    #[test]
+    fn torus_by_hand() {
+        let torus = Solid::Torus { minor: 0.25 };
+        close(&ts(&torus, [-3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), &[(1.75, 2.25), (3.75, 4.25)]);
+        close(&ts(&torus, [1.0, 0.0, 2.0], [0.0, 0.0, -4.0]), &[(0.4375, 0.5625)]);
+        close(&ts(&torus, [0.0, 0.0, 2.0], [0.0, 0.0, -1.0]), &[]);
+        // Along the inner equator's tangent: enters where x^2 + 0.75^2 = 1.25^2.
+        close(
+            &ts(&torus, [-3.0, 0.76, 0.0], [1.0, 0.0, 0.0]).into_iter().take(1).map(|s| (s.0, 0.0)).collect::<Vec<_>>(),
+            &[(3.0 - (1.25f64 * 1.25 - 0.76 * 0.76).sqrt(), 0.0)],
+        );
+        let placed = placed_torus(DVec3::ZERO, DVec3::Z, 2.0, 0.5).unwrap();
+        assert!(matches!(placed.solid, Solid::Torus { minor } if minor == 0.25));
+    }
+
+    #[test]
+    fn taper_by_hand() {
+        // At z = 0.5 the semi-axes are 0.75 and 0.5.
+        let solid = Solid::Taper { x: 0.5, y: 0.0 };
+        close(&ts(&solid, [-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]), &[(2.25, 3.75)]);
+        close(&ts(&solid, [0.0, -3.0, 0.5], [0.0, 1.0, 0.0]), &[(2.5, 3.5)]);
+        close(&ts(&solid, [0.0, 0.0, 3.0], [0.0, 0.0, -1.0]), &[(2.0, 3.0)]);
+        close(&ts(&solid, [0.0, 0.25, 3.0], [0.0, 0.0, -1.0]), &[(2.25, 3.0)]);
+    }
+
+    #[test]
+    fn curved_by_hand() {
+        // Radius 1/sqrt 2 half-way up the paraboloid; a waist of radius 1/2.
+        let bowl = Solid::Round { profile: [1.0, -1.0, 0.0] };
+        let r = 0.5f64.sqrt();
+        close(&ts(&bowl, [-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]), &[(3.0 - r, 3.0 + r)]);
+        close(&ts(&bowl, [0.5, 0.0, 3.0], [0.0, 0.0, -1.0]), &[(2.25, 3.0)]);
+        let waist = Solid::Round { profile: [1.0, -3.0, 3.0] };
+        close(&ts(&waist, [-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]), &[(2.5, 3.5)]);
+        // g = 0.81 at (1 -+ sqrt(1 - 4 * 0.19 / 3)) / 2.
+        let root = (1.0f64 - 4.0 * 0.19 / 3.0).sqrt();
+        close(&ts(&waist, [0.9, 0.0, 3.0], [0.0, 0.0, -1.0]), &[(2.0, 2.5 - root / 2.0), (2.5 + root / 2.0, 3.0)]);
+        let gutter = Solid::Trough { profile: [1.0, -1.0, 0.0] };
+        close(&ts(&gutter, [-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]), &[(2.0, 4.0)]);
+        close(&ts(&gutter, [0.0, 0.0, 3.0], [0.0, 0.0, -1.0]), &[(2.0, 3.0)]);
+    }
+}

@@ -1,0 +1,185 @@
+//! Where a quartic is not positive on an interval, by lanes: the roots of each derivative part the interval into pieces
+//! on which the next one is monotone (Collins, Loos, "Polynomial real root isolation by differentiation", 1976).
+//! What is inside is told by signs alone at common points, so the number of boundaries is always even; closed forms
+//! lose their digits just where a line grazes.
+
+use crate::lanes::{LaneMask, Lanes, Real};
+
+/// Most steps of one root: bisection alone needs one per bit.
+const STEPS: u32 = 64;
+
+/// A quartic: coefficients of 1, s, s^2, s^3, s^4.
+pub type Quartic<V> = [V; 5];
+
+/// Calls `emit(lanes, in, out)` for every span of -1..1 where `p` <= 0, in order. `ends_outside`: the ends of the
+/// interval count as positive whatever rounding says.
+#[inline(always)]
+pub fn spans<V: Lanes>(p: &Quartic<V>, ends_outside: bool, mut emit: impl FnMut(V::Mask, V, V)) {
+    let (low, high) = (V::constant(-1.0), V::constant(1.0));
+    let slope = [p[1], twice(p[2]), V::constant(3.0) * p[3], twice(twice(p[4]))];
+    let [e1, e2] = bends(p);
+    // Extrema only need to be known to the root of the precision: the quartic is flat there.
+    let coarse = V::splat(V::Scalar::EPSILON).sqrt();
+    let fine = V::constant(4.0 * V::Scalar::EPSILON.to_f64());
+    let turn = |from: V, to: V| monotone_root(&slope, from, to, coarse);
+    let points = [low, turn(low, e1), turn(e1, e2), turn(e2, high), high];
+    let zero = V::constant(0.0);
+    let mut inside = points.map(|s| value(p, s).cmp_le(zero));
+    if ends_outside {
+        (inside[0], inside[4]) = (V::Mask::from_bits(0), V::Mask::from_bits(0));
+    }
+    let mut opened = low;
+    for i in 0..4 {
+        let (enters, leaves) = (!inside[i] & inside[i + 1], inside[i] & !inside[i + 1]);
+        if (enters | leaves).any() {
+            let root = monotone_root(p, points[i], points[i + 1], fine);
+            opened = V::select(enters, root, opened);
+            if leaves.any() {
+                emit(leaves, opened, root);
+            }
+        }
+    }
+    if inside[4].any() {
+        emit(inside[4], opened, high);
+    }
+}
+
+#[inline(always)]
+fn twice<V: Lanes>(x: V) -> V {
+    x + x
+}
+
+/// Value of a polynomial (Horner's rule).
+#[inline(always)]
+fn value<V: Lanes, const N: usize>(p: &[V; N], s: V) -> V {
+    let mut sum = p[N - 1];
+    for i in (0..N - 1).rev() {
+        sum = sum.mul_add(s, p[i]);
+    }
+    sum
+}
+
+/// Value of a polynomial's derivative.
+#[inline(always)]
+fn derivative<V: Lanes, const N: usize>(p: &[V; N], s: V) -> V {
+    let mut sum = V::constant((N - 1) as f64) * p[N - 1];
+    for i in (1..N - 1).rev() {
+        sum = sum.mul_add(s, V::constant(i as f64) * p[i]);
+    }
+    sum
+}
+
+/// Ascending points of -1..1 between which the second derivative keeps its sign.
+#[inline(always)]
+fn bends<V: Lanes>(p: &Quartic<V>) -> [V; 2] {
+    // Half of it: a s^2 + 2 b s + c.
+    let (a, b, c) = (V::constant(6.0) * p[4], V::constant(1.5) * p[3], p[2]);
+    let zero = V::constant(0.0);
+    let root = b.mul_add(b, -(a * c)).fast_max(zero).sqrt();
+    let q = V::select(b.cmp_lt(zero), root - b, -(b + root));
+    // A root that is not a number is none: any point will do.
+    let inner = |s: V| s.fast_min(V::constant(1.0)).fast_max(V::constant(-1.0));
+    let (r0, r1) = (inner(q / a), inner(c / q));
+    [r0.fast_min(r1), r0.fast_max(r1)]
+}
+
+/// The root of `p` between `from` and `to`, where it is monotone; `to` if it has one sign there. Newton's iteration kept
+/// within a shrinking bracket, until a step is below `tolerance`; lanes that are done stay as they are.
+#[inline(always)]
+fn monotone_root<V: Lanes, const N: usize>(p: &[V; N], from: V, to: V, tolerance: V) -> V {
+    let zero = V::constant(0.0);
+    let half = V::constant(0.5);
+    let starts_inside = value(p, from).cmp_le(zero);
+    let differs = (starts_inside & !value(p, to).cmp_le(zero)) | (!starts_inside & value(p, to).cmp_le(zero));
+    let mut todo = differs & V::Mask::from_bits(V::ALL);
+    let (mut lo, mut hi) = (from, to);
+    let mut s = V::select(todo, half * (from + to), to);
+    for _ in 0..STEPS {
+        if !todo.any() {
+            break;
+        }
+        let here = value(p, s);
+        let inside = here.cmp_le(zero);
+        // The root is after `s` if `s` is on the side of the start.
+        let before = (inside & starts_inside) | (!inside & !starts_inside);
+        lo = V::select(before & todo, s, lo);
+        hi = V::select(!before & todo, s, hi);
+        let newton = s - here / derivative(p, s);
+        let kept = lo.cmp_lt(newton) & newton.cmp_lt(hi);
+        let next = V::select(kept, newton, half * (lo + hi));
+        let small = (next - s).abs().cmp_le(tolerance);
+        s = V::select(todo, next, s);
+        todo = todo & !small & !(hi - lo).cmp_le(tolerance);
+    }
+    s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lanes::{f32x8, f64x4};
+
+    /// (s - a) (s - b) (s - c) (s - d).
+    fn with_roots(r: [f64; 4]) -> [f64; 5] {
+        let [a, b, c, d] = r;
+        let pairs = |i: usize| (0..4).filter(|&j| j != i).map(|j| r[i] * r[j]).sum::<f64>();
+        let (e2, e3) = ((0..4).map(pairs).sum::<f64>() / 2.0, a * b * c + a * b * d + a * c * d + b * c * d);
+        [a * b * c * d, -e3, e2, -(a + b + c + d), 1.0]
+    }
+
+    fn spans_of<V: Lanes>(p: [f64; 5], ends_outside: bool) -> Vec<[f64; 2]> {
+        let mut found = Vec::new();
+        spans(&p.map(V::constant), ends_outside, |lanes, a: V, b: V| {
+            assert!(lanes.bits() == V::ALL, "all lanes hold the same quartic");
+            found.push([a.lane(0).to_f64(), b.lane(0).to_f64()]);
+        });
+        found
+    }
+
+    fn close(got: &[[f64; 2]], want: &[[f64; 2]], tolerance: f64) {
+        let near = |g: &[f64; 2], w: &[f64; 2]| (0..2).all(|i| (g[i] - w[i]).abs() <= tolerance);
+        assert!(got.len() == want.len() && got.iter().zip(want).all(|(g, w)| near(g, w)), "{got:?} {want:?}");
+    }
+
+    #[test]
+    fn roots_by_hand() {
+        for (roots, want) in [
+            ([-0.5, -0.25, 0.25, 0.75], vec![[-0.5, -0.25], [0.25, 0.75]]),
+            ([-2.0, -0.5, 0.5, 2.0], vec![[-1.0, -0.5], [0.5, 1.0]]),
+            ([-2.0, 2.0, 3.0, 4.0], vec![[-1.0, 1.0]]),
+            ([-0.9, 0.9, 5.0, 6.0], vec![[-0.9, 0.9]]),
+            ([3.0, 4.0, 5.0, 6.0], vec![]),
+        ] {
+            close(&spans_of::<f64x4>(with_roots(roots), false), &want, 1e-13);
+            close(&spans_of::<f64>(with_roots(roots), false), &want, 1e-13);
+            close(&spans_of::<f32x8>(with_roots(roots), false), &want, 2e-5);
+        }
+        close(&spans_of::<f64>(with_roots([-2.0, 2.0, 3.0, 4.0]), true), &[], 0.0);
+    }
+
+    #[test]
+    fn lower_degrees_and_constants() {
+        // s^2 - 1/4, s - 1/2, -1, 1.
+        close(&spans_of::<f64>([-0.25, 0.0, 1.0, 0.0, 0.0], false), &[[-0.5, 0.5]], 1e-14);
+        close(&spans_of::<f64>([-0.5, 1.0, 0.0, 0.0, 0.0], false), &[[-1.0, 0.5]], 1e-14);
+        close(&spans_of::<f64>([-1.0, 0.0, 0.0, 0.0, 0.0], false), &[[-1.0, 1.0]], 0.0);
+        close(&spans_of::<f64>([1.0, 0.0, 0.0, 0.0, 0.0], false), &[], 0.0);
+        close(&spans_of::<f64>([f64::NAN; 5], false), &[], 0.0);
+    }
+
+    #[test]
+    fn a_lane_does_not_depend_on_its_neighbours() {
+        let all = [[-0.5, -0.25, 0.25, 0.75], [-0.7, -0.7, 0.1, 0.1001], [-2.0, 0.3, 3.0, 4.0], [3.0, 4.0, 5.0, 6.0]];
+        let p: [f64x4; 5] = std::array::from_fn(|k| f64x4::new(all.map(|r| with_roots(r)[k])));
+        let mut lanes = [const { Vec::new() }; 4];
+        spans(&p, false, |mask, a, b| {
+            for (i, list) in lanes.iter_mut().enumerate().filter(|(i, _)| mask.bits() >> i & 1 != 0) {
+                list.push([a.lane(i).to_bits(), b.lane(i).to_bits()]);
+            }
+        });
+        for (roots, got) in all.into_iter().zip(lanes) {
+            let want: Vec<_> = spans_of::<f64>(with_roots(roots), false).iter().map(|s| s.map(f64::to_bits)).collect();
+            assert_eq!(got, want, "{roots:?}");
+        }
+    }
+}

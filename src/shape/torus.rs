@@ -1,0 +1,55 @@
+//! The canonical torus about the z axis, major radius 1 (Hanrahan, "A survey of ray-surface intersection algorithms",
+//! in Glassner, An Introduction to Ray Tracing, 1989, for the quartic).
+
+use glam::DVec3;
+
+use super::quartic;
+use super::span::{Span, nearest_to_origin};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot};
+
+/// How much wider than the solid the interval is in which roots are looked for: its ends are outside.
+const ROOM: f64 = 1.0 / 256.0;
+
+/// Spans of lines inside the torus whose tube has the radius `minor` <= 1. Face 0.
+#[inline(always)]
+pub fn torus<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, minor: V::Scalar, mut emit: impl FnMut(Span<V>)) {
+    let (o, shift) = nearest_to_origin(o, d);
+    let minor = V::splat(minor);
+    let wide = V::constant(1.0 + ROOM);
+    // The line's way through a ball, cut by a slab.
+    let ball = (V::constant(1.0) + minor) * wide;
+    let room = ball.mul_add(ball, -dot(o, o));
+    let chord = (room / dot(d, d)).sqrt();
+    let flat = minor * wide;
+    let slab = Span::slab(o[2], d[2], [-flat, flat], [0.0, 0.0]);
+    let (from, to) = (slab.t_in.fast_max(-chord), slab.t_out.fast_min(chord));
+    let met = slab.hit & V::constant(0.0).cmp_lt(room) & from.cmp_lt(to);
+    if !met.any() {
+        return;
+    }
+    let half = V::constant(0.5);
+    let (middle, reach) = (half * (from + to), half * (to - from));
+    let o = [0, 1, 2].map(|a| d[a].mul_add(middle, o[a]));
+    let d = d.map(|x| x * reach);
+    // p = (|x|^2 + 1 - minor^2)^2 - 4 (x^2 + y^2), with the square of g0 + 2 g1 s + g2 s^2.
+    let (g0, g1, g2) = (dot(o, o) + (V::constant(1.0) - minor * minor), dot(o, d), dot(d, d));
+    let round = |a: Lanes3<V>, b: Lanes3<V>| a[0].mul_add(b[0], a[1] * b[1]);
+    let (two, four) = (V::constant(2.0), V::constant(4.0));
+    let p = [
+        g0.mul_add(g0, -(four * round(o, o))),
+        four * g0.mul_add(g1, -(two * round(o, d))),
+        (two * g0).mul_add(g2, four * (g1.mul_add(g1, -round(d, d)))),
+        four * (g1 * g2),
+        g2 * g2,
+    ];
+    quartic::spans(&p, true, |lanes, s_in, s_out| {
+        let at = |s: V| reach.mul_add(s, middle) + shift;
+        emit(Span::plain(lanes & met, at(s_in), at(s_out)));
+    });
+}
+
+/// Outward normal (not unit) at a surface point.
+pub fn torus_normal(point: DVec3) -> DVec3 {
+    let round = DVec3::new(point.x, point.y, 0.0);
+    point - round.normalize_or(DVec3::X)
+}
