@@ -7,6 +7,7 @@ mod bench;
 mod info;
 mod interrupt;
 mod isa;
+mod picture;
 mod rays;
 mod render;
 mod trace;
