@@ -50,8 +50,22 @@ const ERRORS: &[(&str, &str, &str)] = &[
     ("sphere radius=\"sqr(2)\"", "1:16", "did you mean `sqrt`?"),
     ("light pont", "1:7", "did you mean `point`?"),
     ("camera { eye 0 0 1; lookat 0 0 0 }", "1:21", "did you mean `look-at`?"),
-    ("union { sphere }", "1:1", "not supported yet"),
-    ("group { difference { sphere } }", "1:9", "not supported yet"),
+    ("unoin { sphere }", "1:1", "did you mean `union`?"),
+    ("difference { sphere; disc }", "1:22", "has no inside"),
+    ("union { polygon { point 0 0 0 } }", "1:9", "no solid that can be combined"),
+    ("union { spher }", "1:9", "did you mean `sphere`?"),
+    ("complement { sphere; box }", "1:1", "takes one solid, found 2"),
+    ("union { union tolerance=1 { sphere } }", "1:15", "outermost"),
+    ("union tolerance=-1 { sphere }", "1:7", "must not be negative"),
+    ("union { instance \"bal\" }\ndefine ball { sphere }", "1:18", "did you mean `ball`?"),
+    ("define a { sphere; instance a }\nunion { instance a }", "1:29", "contains an instance of itself"),
+    ("torus tube=2", "1:7", "wider than its ring"),
+    ("polyhedron { plane 1 0 0 }", "1:14", "takes four numbers"),
+    ("polyhedron { plane 1 0 0 1; plane -1 0 0 1; plane 0 1 0 1; plane 0 -1 0 1 }", "1:1", "do not enclose"),
+    ("ellipsoid radii=\"1, 0, 1\"", "1:11", "must be above zero"),
+    ("hyperboloid waist=0.5 apex=1", "1:23", "not both"),
+    ("hyperboloid waist=1.5", "1:1", "between 0 and 1"),
+    ("parameter a. 1", "1:11", "cannot name"),
     ("translate 1 2 3", "1:1", "must come before the items"),
     ("group { sphere; scale 2 }", "1:17", "must come before the items"),
     ("group { camera }", "1:9", "top level"),
@@ -201,8 +215,12 @@ fn damaged_scenes_never_panic() {
         (state % n as u64) as usize
     };
     // The big scenes are made small: it is their text that matters.
-    let small =
-        |text: &str| text.replace("rows 40", "rows 3").replace("size 224", "size 8").replace("depth 4", "depth 1");
+    let small = |text: &str| {
+        text.replace("rows 40", "rows 3")
+            .replace("size 224", "size 8")
+            .replace("depth 4", "depth 1")
+            .replace("side 10", "side 2")
+    };
     let scenes: Vec<String> =
         lanecast::scene::builtin::NAMES.iter().map(|n| small(lanecast::scene::builtin::text(n).unwrap())).collect();
     let pieces =

@@ -1,5 +1,7 @@
 //! `lanecast trace`: a file of rays through one engine, checked, timed, hits written.
 
+mod stretches;
+
 use std::borrow::Cow;
 use std::path::PathBuf;
 
@@ -16,7 +18,7 @@ use crate::measure::raysets::{Query, split};
 use crate::measure::stats::{Summary, summary};
 use crate::measure::timing::{Series, Tracer, Workers, interleave};
 use crate::measure::truth;
-use crate::ray::Rays;
+use crate::ray::{Counters, Rays};
 use crate::reference::Oracle;
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
@@ -25,6 +27,7 @@ use crate::trace::{Engine, Engines, engine};
 const EXAMPLES: &str = "\
 Examples:
   lanecast trace model.ply --rays primary.npy
+  lanecast trace bolt.kdl --rays primary.npy --query all --hits inside.npy
   lanecast trace model.ply --rays ao.npy --query any --engine scalar --threads 1 --json
   lanecast trace model.ply --rays primary.npy --hits hits.npy --repeat 1
 
@@ -41,9 +44,9 @@ pub struct TraceArgs {
     /// File of rays
     #[arg(long, value_name = "FILE.npy")]
     rays: PathBuf,
-    /// What to ask: closest or any
+    /// What to ask: closest, any, or all (every stretch inside a solid)
     #[arg(long, default_value = "closest")]
-    query: Query,
+    query: Asked,
     #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
@@ -51,11 +54,34 @@ pub struct TraceArgs {
     /// Timed passes
     #[arg(long, value_name = "R", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     repeat: u32,
-    /// Write the hits: t u v prim inst per ray, or one byte per ray for --query any
+    /// Write the hits: t u v prim inst per ray, or one byte per ray for --query any; for --query all
+    /// t_in t_out ray inst prim_in prim_out per stretch of a ray inside a solid
     #[arg(long, value_name = "FILE.npy")]
     hits: Option<PathBuf>,
     #[command(flatten)]
     pub(super) output: OutputArgs,
+}
+
+/// What is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asked {
+    /// The nearest hit, or whether there is one.
+    Hits(Query),
+    /// All stretches inside solids.
+    All,
+}
+
+impl std::str::FromStr for Asked {
+    type Err = Error;
+
+    fn from_str(word: &str) -> Result<Self> {
+        match word {
+            "all" => Ok(Self::All),
+            _ => word.parse().map(Self::Hits).map_err(|_: Error| {
+                Error::Usage(format!("unknown query `{word}`; the queries are closest, any and all"))
+            }),
+        }
+    }
 }
 
 /// The object of `--json`.
@@ -75,6 +101,37 @@ struct Report<'a> {
     build_seconds: f64,
     bytes: Bytes,
     checksum: String,
+    /// What trees of solids cost, if there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    solids: Option<SolidCounts>,
+}
+
+/// Counts of the event sweeps, each over the number of rays.
+#[derive(Serialize)]
+struct SolidCounts {
+    /// Trees of solids tested, one packet each.
+    tests_per_ray: f64,
+    /// Leaves whose boxes the packets met.
+    leaves_met_per_ray: f64,
+    /// Leaves left after pruning.
+    leaves_kept_per_ray: f64,
+    /// Boundaries of leaves, one packet each.
+    events_per_ray: f64,
+    /// Steps over them.
+    steps_per_ray: f64,
+}
+
+impl SolidCounts {
+    fn of(counters: &Counters) -> Option<Self> {
+        let per_ray = |count: u64| count as f64 / counters.rays.max(1) as f64;
+        (counters.solids > 0).then(|| Self {
+            tests_per_ray: per_ray(counters.solids),
+            leaves_met_per_ray: per_ray(counters.solid_leaves_met),
+            leaves_kept_per_ray: per_ray(counters.solid_leaves_kept),
+            events_per_ray: per_ray(counters.solid_events),
+            steps_per_ray: per_ray(counters.solid_steps),
+        })
+    }
 }
 
 #[derive(Serialize)]
@@ -104,18 +161,20 @@ struct Bytes {
 pub fn run(args: &TraceArgs) -> Result<()> {
     let description = args.scene.load()?;
     let rays = npy::read_rays(&args.rays)?;
-    match args.scene.options.precision(&description) {
-        Precision::F32 => trace::<f32>(args, &description, &rays),
-        Precision::F64 => trace::<f64>(args, &description, &rays),
+    match (args.query, args.scene.options.precision(&description)) {
+        (Asked::Hits(query), Precision::F32) => trace::<f32>(args, query, &description, &rays),
+        (Asked::Hits(query), Precision::F64) => trace::<f64>(args, query, &description, &rays),
+        (Asked::All, Precision::F32) => stretches::run::<f32>(args, &description, &rays),
+        (Asked::All, Precision::F64) => stretches::run::<f64>(args, &description, &rays),
     }
 }
 
-fn trace<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f32>) -> Result<()> {
+fn trace<S: Engines>(args: &TraceArgs, query: Query, description: &Description, rays: &Rays<f32>) -> Result<()> {
     let engine = args.engine.find::<S>()?;
     let workers = Workers::new(args.threads.count())?;
     let world = workers.install(|| World::<S>::compile(description, args.scene.options.preset()))?;
     let batches = split::<S>(rays);
-    let answers = checked(&workers, engine, &world, &batches, args.query)?;
+    let answers = checked(&workers, engine, &world, &batches, query)?;
 
     let mut series = [Series::new(Tracer::Engine(engine), answers)];
     interleave(&workers, &world, &batches, &mut series, (0, args.repeat), &stopped)?;
@@ -132,7 +191,7 @@ fn trace<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f3
     let report = Report {
         scene: &args.scene.scene,
         engine: engine.name(),
-        query: args.query.name(),
+        query: query.name(),
         precision: S::PRECISION,
         isa: compiled_isa(),
         threads: workers.threads(),
@@ -148,6 +207,7 @@ fn trace<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f3
             total: stats.node_bytes + stats.prim_bytes,
         },
         checksum: format!("{:016x}", answers.checksum()),
+        solids: SolidCounts::of(&workers.count(engine, &world, &batches, query)),
     };
     if args.output.json { json_to_stdout(&report) } else { to_stdout(&text(&report, &seconds)) }
 }
@@ -180,13 +240,19 @@ fn mrays(rays: u64, seconds: f64) -> f64 {
 fn text(report: &Report<'_>, seconds: &Summary) -> String {
     let share = 100.0 * report.hits as f64 / (report.rays.max(1)) as f64;
     let mib = report.bytes.total as f64 / f64::from(1 << 20);
+    let solids = report.solids.as_ref().map_or(String::new(), |s| {
+        format!(
+            "solids   per ray {:.3} tests, {:.3} leaves met, {:.3} kept, {:.3} events, {:.3} steps (packets)\n",
+            s.tests_per_ray, s.leaves_met_per_ray, s.leaves_kept_per_ray, s.events_per_ray, s.steps_per_ray
+        )
+    });
     format!(
         "{} {} {} {} ({}), {} threads\n\
          rays     {}, {} hit ({share:.1} %)\n\
          speed    {:.3} Mrays/s median, {:.3} best of {} (spread {:.1} %)\n\
          pass     {:.3} ms median\n\
          build    {:.3} s, {mib:.1} MiB\n\
-         checksum {}\n",
+         {solids}checksum {}\n",
         report.scene,
         report.engine,
         report.query,

@@ -2,7 +2,7 @@
 //!
 //! Source of the boxes: Cameron, "Efficient bounds in constructive solid geometry", IEEE CG&A 11(3), 1991 (S-bounds).
 
-use super::leaf::{Leaf, LeafInput, PlaneList};
+use super::leaf::{Leaf, LeafInput, Stores};
 use super::solid::{LINEAR, Solid};
 use super::tree::{Gate, Node, Token, Tree};
 use crate::bvh::{self, Preset};
@@ -10,7 +10,7 @@ use crate::lanes::Real;
 use crate::math::Aabb;
 
 /// A solid to be compiled.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Input<'a> {
     /// Leaves by number.
     pub leaves: &'a [LeafInput<'a>],
@@ -32,12 +32,12 @@ pub struct Built<S> {
 /// Compiles a solid.
 pub fn build<S: Real>(input: &Input, preset: Preset) -> Built<S> {
     let tree = Tree::new(input.program, input.leaves.len());
-    let mut planes: PlaneList<S> = Vec::new();
-    let leaves: Vec<Option<Leaf<S>>> = input.leaves.iter().map(|l| Leaf::new(l, &mut planes)).collect();
+    let mut stores = Stores::default();
+    let leaves: Vec<Option<Leaf<S>>> = input.leaves.iter().map(|l| Leaf::new(l, &mut stores)).collect();
     let dropped = leaves.iter().filter(|l| l.is_none()).count();
     let boxes = Boxes::new(&tree, &leaves);
     let groups = groups(&tree, &boxes, input.tolerance);
-    let whole = Whole { tree: &tree, leaves: &leaves, planes: &planes, boxes: &boxes };
+    let whole = Whole { tree: &tree, leaves: &leaves, stores: &stores, boxes: &boxes };
     let mut number = vec![0; tree.nodes.len()];
     let parts = groups.iter().filter_map(|group| whole.part(group, groups.len() == 1, &mut number));
     let solids = parts.map(|part| part.finished(S::from_f64(input.tolerance), preset)).collect();
@@ -173,7 +173,7 @@ fn separate<S: Real>(boxes: &[Aabb<S>], gap: f64) -> (usize, Vec<u32>) {
 struct Whole<'a, S> {
     tree: &'a Tree,
     leaves: &'a [Option<Leaf<S>>],
-    planes: &'a PlaneList<S>,
+    stores: &'a Stores<S>,
     boxes: &'a Boxes<S>,
 }
 
@@ -206,7 +206,7 @@ impl<S: Real> Whole<'_, S> {
             {
                 solid.numbers.push(i);
                 solid.tree.leaves.push(place);
-                let leaf = leaf.moved(self.planes, &mut solid.planes);
+                let leaf = leaf.moved(self.stores, &mut solid.stores);
                 solid.leaves.push(Leaf { clip, ..leaf });
             }
         }
@@ -226,7 +226,7 @@ impl<S: Real> Solid<S> {
             tree,
             leaves: Vec::new(),
             numbers: Vec::new(),
-            planes: Vec::new(),
+            stores: Stores::default(),
             bounds: Aabb::EVERYTHING,
             size: S::ZERO,
             least: S::ZERO,

@@ -1,7 +1,10 @@
 //! Leaves: a kernel of the floor of shapes, the way into its local space, its box.
 
+use std::sync::Arc;
+
 use glam::{DAffine3, DVec3};
 
+use super::mesh::{Crossings, Mesh};
 use super::sweep::Events;
 use crate::lanes::{Lanes, Real};
 use crate::math::{Aabb, Affine, transformed_bounds};
@@ -10,7 +13,7 @@ use crate::ray::slab::Interval;
 use crate::shape::{self, Cone, Cuboid, Cylinder, HalfSpace, Solid as Canonical, Sphere};
 
 /// A canonical solid by its numbers.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub enum Form<'a> {
     /// Unit sphere.
     Sphere,
@@ -32,10 +35,20 @@ pub enum Form<'a> {
     Torus(f64),
     /// Semi-axes at z = 1.
     Taper([f64; 2]),
+    /// Corners of the triangles of a closed mesh, counter-clockwise seen from outside.
+    Mesh(&'a dyn Triangles),
+}
+
+/// Triangles one by one.
+pub trait Triangles: Sync {
+    /// How many.
+    fn count(&self) -> usize;
+    /// Corners of one.
+    fn corners(&self, i: usize) -> [DVec3; 3];
 }
 
 /// A leaf to be compiled.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct LeafInput<'a> {
     /// Its canonical solid.
     pub form: Form<'a>,
@@ -63,6 +76,8 @@ pub(super) enum Kind {
     Trough,
     Torus,
     Taper,
+    /// Index into the solid's meshes.
+    Mesh(u32),
 }
 
 /// A compiled leaf.
@@ -75,12 +90,18 @@ pub(super) struct Leaf<S> {
     pub clip: Aabb<S>,
 }
 
-/// Planes of polyhedra, in the tree's space: normal and offset.
-pub(super) type PlaneList<S> = Vec<[S; 4]>;
+/// What leaves of unequal size keep outside of their records.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Stores<S> {
+    /// Planes of polyhedra, in the tree's space: normal and offset.
+    pub planes: Vec<[S; 4]>,
+    /// Meshes.
+    pub meshes: Vec<Arc<Mesh<S>>>,
+}
 
 impl<S: Real> Leaf<S> {
     /// Compiles `input`; `None` if its map overflows `S`.
-    pub fn new(input: &LeafInput, planes: &mut PlaneList<S>) -> Option<Self> {
+    pub fn new(input: &LeafInput, stores: &mut Stores<S>) -> Option<Self> {
         let inverse = input.to_tree.inverse();
         let to_local = Affine::<S>::from_f64(&inverse);
         let finite = to_local.rows.as_flattened().iter().all(|x| x.is_finite());
@@ -94,41 +115,59 @@ impl<S: Real> Leaf<S> {
             Form::Cone(top) if top >= 1.0 => (Kind::Cylinder, [S::ZERO; 3]),
             Form::Cone(top) => (Kind::Cone, three([top, 0.0, 0.0])),
             Form::Planes(list) => {
-                let first = planes.len() as u32;
-                planes.extend(list.iter().map(|plane| placed_plane(plane, &inverse)));
+                let first = stores.planes.len() as u32;
+                stores.planes.extend(list.iter().map(|plane| placed_plane(plane, &inverse)));
                 (Kind::Planes { first, count: list.len() as u32 }, [S::ZERO; 3])
             }
             Form::Round(profile) => (Kind::Round, three(profile)),
             Form::Trough(profile) => (Kind::Trough, three(profile)),
             Form::Torus(minor) => (Kind::Torus, three([minor, 0.0, 0.0])),
             Form::Taper([x, y]) => (Kind::Taper, three([x, y, 0.0])),
+            Form::Mesh(triangles) => {
+                stores.meshes.push(Arc::new(placed_mesh(triangles, &input.to_tree)));
+                (Kind::Mesh(stores.meshes.len() as u32 - 1), [S::ZERO; 3])
+            }
         };
         let bounded = clip.is_bounded() || !(input.lo.is_finite() && input.hi.is_finite());
         (finite && bounded).then_some(Self { kind, to_local, params, clip })
     }
 
-    /// The same leaf with its planes in another list.
-    pub fn moved(&self, from: &PlaneList<S>, to: &mut PlaneList<S>) -> Self {
-        let Kind::Planes { first, count } = self.kind else { return *self };
-        let planes = &from[first as usize..][..count as usize];
-        let first = to.len() as u32;
-        to.extend_from_slice(planes);
-        Self { kind: Kind::Planes { first, count }, ..*self }
+    /// The same leaf with what it keeps outside in another place.
+    pub fn moved(&self, from: &Stores<S>, to: &mut Stores<S>) -> Self {
+        let kind = match self.kind {
+            Kind::Planes { first, count } => {
+                let planes = &from.planes[first as usize..][..count as usize];
+                let first = to.planes.len() as u32;
+                to.planes.extend_from_slice(planes);
+                Kind::Planes { first, count }
+            }
+            Kind::Mesh(index) => {
+                to.meshes.push(from.meshes[index as usize].clone());
+                Kind::Mesh(to.meshes.len() as u32 - 1)
+            }
+            other => other,
+        };
+        Self { kind, ..*self }
     }
 
-    /// Adds the boundaries of this leaf in `lanes` to `events`, moved into the interval of its box.
+    /// Adds the boundaries of this leaf in `lanes` to `events`; `within`: where the lines meet its box, give or take.
     #[inline(always)]
     pub fn boundaries<V: Lanes<Scalar = S>>(
         &self,
         packet: &Packet<V>,
         within: &Interval<V>,
-        planes: &PlaneList<S>,
+        (stores, eps): (&Stores<S>, V),
         (slot, lanes): (u32, u32),
-        events: &mut Events<S>,
+        (events, crossings): (&mut Events<S>, &mut Crossings),
     ) {
+        if let Kind::Mesh(index) = self.kind {
+            let mesh = &stores.meshes[index as usize];
+            mesh.boundaries(packet, within, eps, (slot, lanes), crossings, events);
+            return;
+        }
         let mut push = |span| events.push_span(slot, lanes, &span, within);
         if let Kind::Planes { first, count } = self.kind {
-            let planes = &planes[first as usize..][..count as usize];
+            let planes = &stores.planes[first as usize..][..count as usize];
             push(shape::planes_span(packet.org, packet.dir, planes));
             return;
         }
@@ -144,9 +183,18 @@ impl<S: Real> Leaf<S> {
             Kind::Trough => shape::quadric::trough(o, d, p, push),
             Kind::Torus => shape::torus(o, d, p[0], push),
             Kind::Taper => shape::taper(o, d, [p[0], p[1]], push),
-            Kind::Planes { .. } => {}
+            Kind::Planes { .. } | Kind::Mesh(_) => {}
         }
     }
+}
+
+/// A mesh in the tree's space; a mirroring map turns its triangles round.
+fn placed_mesh<S: Real>(triangles: &dyn Triangles, to_tree: &DAffine3) -> Mesh<S> {
+    let mirrored = to_tree.matrix3.determinant() < 0.0;
+    Mesh::new((0..triangles.count()).map(|i| {
+        let [a, b, c] = triangles.corners(i).map(|p| to_tree.transform_point3(p));
+        if mirrored { [a, c, b] } else { [a, b, c] }
+    }))
 }
 
 /// A plane of the canonical space in the tree's: it is the same set of points.

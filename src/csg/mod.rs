@@ -6,13 +6,14 @@
 
 mod build;
 mod leaf;
+mod mesh;
 mod prune;
 mod solid;
 mod sweep;
 mod tree;
 
 pub use build::{Built, Input, build};
-pub use leaf::{Form, LeafInput};
+pub use leaf::{Form, LeafInput, Triangles};
 pub use solid::Solid;
-pub use sweep::{Boundary, Effort, Scratch, sweep};
+pub use sweep::{Boundary, Depth, Effort, Scratch, sweep};
 pub use tree::{Op, Token};

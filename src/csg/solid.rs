@@ -1,6 +1,7 @@
 //! A compiled solid: leaves, operations, bounds, and a tree over the leaves' boxes where there are many.
 
-use super::leaf::{Leaf, PlaneList};
+use super::leaf::{Leaf, Stores};
+use super::mesh::Crossings;
 use super::prune::Met;
 use super::sweep::Events;
 use super::tree::Tree;
@@ -12,6 +13,8 @@ use crate::ray::slab::Interval;
 
 /// Boundaries closer than this many roundings of the coordinates are one: 16 half ulps.
 const ROUNDINGS: f64 = 16.0;
+/// Layers of leaves in the first part of a line.
+const LAYERS: f64 = 4.0;
 /// More bounded leaves than this are searched by a tree.
 pub(super) const LINEAR: usize = 24;
 
@@ -22,7 +25,7 @@ pub struct Solid<S> {
     pub(super) leaves: Vec<Leaf<S>>,
     /// Numbers of the leaves in the program it was compiled from.
     pub(super) numbers: Vec<u32>,
-    pub(super) planes: PlaneList<S>,
+    pub(super) stores: Stores<S>,
     /// Outside of this box there is nothing; infinite where a complement reaches everywhere.
     pub bounds: Aabb<S>,
     /// Largest coordinate of the bounded leaves' boxes.
@@ -42,6 +45,11 @@ impl<S: Real> Solid<S> {
         self.numbers[leaf as usize]
     }
 
+    /// Whether it is everything but a part of space: inside where no leaf is met.
+    pub fn reaches_everywhere(&self) -> bool {
+        self.tree.nodes[0].default
+    }
+
     /// Number of leaves.
     pub fn leaf_count(&self) -> usize {
         self.leaves.len()
@@ -52,8 +60,8 @@ impl<S: Real> Solid<S> {
         let (tree, blocks) = self.search.as_ref().map_or((0, 0), |(tree, blocks)| {
             (size_of_val(&tree.nodes[..]), blocks.iter().map(|b| size_of_val(&b[..])).sum())
         });
-        let own = size_of_val(&self.leaves[..]) + size_of_val(&self.planes[..]) + size_of_val(&self.numbers[..]);
-        own + self.tree.bytes() + tree + blocks
+        let own = size_of_val(&self.leaves[..]) + size_of_val(&self.stores.planes[..]) + size_of_val(&self.numbers[..]);
+        own + self.stores.meshes.iter().map(|m| m.bytes()).sum::<usize>() + self.tree.bytes() + tree + blocks
     }
 
     /// Difference of t below which two boundaries of a lane are one. It depends on the lane's line only.
@@ -65,28 +73,35 @@ impl<S: Real> Solid<S> {
         distance / largest(packet.dir)
     }
 
-    /// Lanes whose line meets a leaf's box, in front of the segment's start or near it, and the interval.
-    #[inline(always)]
-    fn meets<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>, leaf: u32, start: V) -> u32 {
-        let clip = &self.leaves[leaf as usize].clip;
-        let interval = Interval::of(packet, clip.lo, clip.hi);
-        (interval.near.cmp_le(interval.far) & start.cmp_le(interval.far)).bits()
+    /// Share of a line's way through the solid that is looked at first: a few layers of leaves, were they spread evenly.
+    pub(super) fn front(&self) -> f64 {
+        if self.search.is_none() || !self.bounds.is_bounded() {
+            1.0
+        } else {
+            LAYERS / (self.leaves.len() as f64).cbrt()
+        }
     }
 
-    /// Lists the leaves that some of `lanes` meet, each once.
+    /// Lists the leaves that some of `lanes` meet between the segment's start and `reach`, give or take, each once.
     #[inline(always)]
     pub(super) fn meet<V: Lanes<Scalar = S>>(
         &self,
         packet: &Packet<V>,
         lanes: u32,
         eps: V,
+        reach: V,
         met: &mut Vec<Met>,
         stack: &mut Vec<(u32, u32)>,
     ) {
         met.clear();
-        let start = packet.t_min - (eps + eps);
+        let (start, end) = (packet.t_min - (eps + eps), reach + (eps + eps));
+        let meets = |bounds: &Aabb<S>| {
+            let interval = Interval::of(packet, bounds.lo, bounds.hi);
+            let (near, far) = (interval.near, interval.far);
+            (near.cmp_le(far) & start.cmp_le(far) & near.cmp_le(end)).bits()
+        };
         let mut take = |leaf: u32, lanes: u32| {
-            let lanes = self.meets(packet, leaf, start) & lanes;
+            let lanes = meets(&self.leaves[leaf as usize].clip) & lanes;
             if lanes != 0 {
                 met.push(Met { leaf, lanes });
             }
@@ -103,10 +118,7 @@ impl<S: Real> Solid<S> {
         while let Some((node, lanes)) = stack.pop() {
             let node = &tree.nodes[node as usize];
             for slot in 0..node.used as usize {
-                let bounds = node.child_bounds(slot);
-                let interval = Interval::of(packet, bounds.lo, bounds.hi);
-                let meets = interval.near.cmp_le(interval.far) & start.cmp_le(interval.far);
-                let lanes = meets.bits() & lanes;
+                let lanes = meets(&node.child_bounds(slot)) & lanes;
                 if lanes == 0 {
                     continue;
                 }
@@ -120,7 +132,7 @@ impl<S: Real> Solid<S> {
         }
     }
 
-    /// Adds the boundaries of a leaf, unless it lies beyond `limit` in all lanes.
+    /// Adds the boundaries of a leaf, unless it lies beyond `limit` in all lanes. `eps`: the tolerance.
     #[inline(always)]
     pub(super) fn boundaries<V: Lanes<Scalar = S>>(
         &self,
@@ -128,12 +140,17 @@ impl<S: Real> Solid<S> {
         met: &Met,
         slot: u32,
         limit: V,
+        eps: V,
         events: &mut Events<S>,
+        crossings: &mut Crossings,
     ) {
+        let slack = eps + eps;
         let leaf = &self.leaves[met.leaf as usize];
         let within = Interval::of(packet, leaf.clip.lo, leaf.clip.hi);
-        if within.near.cmp_le(limit).bits() & met.lanes != 0 {
-            leaf.boundaries(packet, &within, &self.planes, (slot, met.lanes), events);
+        let within = Interval { near: within.near - slack, far: within.far + slack };
+        // Groups of boundaries that begin before the limit end less than `slack` after it.
+        if within.near.cmp_le(limit + slack).bits() & met.lanes != 0 {
+            leaf.boundaries(packet, &within, (&self.stores, eps), (slot, met.lanes), (events, crossings));
         }
     }
 }

@@ -6,6 +6,7 @@
 //! alone. Sources: Roth, "Ray casting for modeling solids", 1982 (boundaries per line); Lefebvre, "IceSL: A GPU
 //! accelerated CSG modeler and slicer", 2013 (sweep over sorted boundaries with early end).
 
+use super::mesh::Crossings;
 use super::prune::{Met, Program, Pruner};
 use super::solid::Solid;
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
@@ -23,6 +24,7 @@ pub struct Scratch<S> {
     inside: Vec<u32>,
     toggled: Vec<Toggled>,
     stack: Vec<(u32, u32)>,
+    crossings: Crossings,
 }
 
 /// Boundaries of leaves: `MAX_LANES` numbers each.
@@ -92,10 +94,16 @@ impl<S: Real> Events<S> {
         self.leaf.push(leaf);
     }
 
-    /// Adds both boundaries of a span, moved into the interval of the leaf's box, in the lanes of `lanes`.
+    /// Adds both boundaries of a span in the lanes of `lanes`. Those that lie outside of the leaf's box, by more than rounding,
+    /// go to infinity: there the leaf makes no difference, and a boundary must not count where it is not.
     #[inline(always)]
     pub fn push_span<V: Lanes<Scalar = S>>(&mut self, leaf: u32, lanes: u32, span: &Span<V>, within: &Interval<V>) {
-        let (t_in, t_out) = (within.clamp(span.t_in), within.clamp(span.t_out));
+        let (before, after) = (-V::splat(S::INFINITY), V::splat(S::INFINITY));
+        let settled = |t: V| {
+            let t = V::select(t.cmp_lt(within.near), before, t);
+            V::select(within.far.cmp_lt(t), after, t)
+        };
+        let (t_in, t_out) = (settled(span.t_in), settled(span.t_out));
         // Both or none; NaN is none.
         let both = span.hit & t_in.cmp_le(t_out) & V::Mask::from_bits(lanes);
         if both.any() {
@@ -110,22 +118,76 @@ impl<S: Real> Events<S> {
     }
 }
 
+/// How much of the lines' way through a solid is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// All of it: for who wants every boundary.
+    Whole,
+    /// The front part first, then more, as long as lanes need it: for who wants the first boundary. What was reported may
+    /// be reported again.
+    FrontFirst,
+}
+
 /// Reports the boundaries of `solid` on the packet's lines in order of t to `found`, which returns the lanes that need no
-/// more. `limit` is how far lanes look at most; `lanes` are those whose line meets the solid's box.
+/// more. `limit` is how far lanes look at most; `lanes` are those whose line meets the solid's box, in `interval`.
 #[inline(always)]
 pub fn sweep<V: Lanes>(
     solid: &Solid<V::Scalar>,
     packet: &Packet<V>,
+    (lanes, interval): (u32, &Interval<V>),
+    limit: V,
+    depth: Depth,
+    scratch: &mut Scratch<V::Scalar>,
+    mut found: impl FnMut(&Boundary<V>) -> u32,
+) -> Effort {
+    let mut effort = Effort::default();
+    let mut share = if depth == Depth::Whole { 1.0 } else { solid.front() };
+    let start = interval.near.fast_max(packet.t_min);
+    let mut lanes = lanes;
+    loop {
+        // Parts are shares of the lane's own way, so that they are the same in a packet of any width.
+        let part = (interval.far - start) * V::constant(share) + start;
+        let whole = share >= 1.0;
+        let reach = if whole { V::splat(V::Scalar::INFINITY) } else { part };
+        let mut done = 0;
+        effort += pass(solid, packet, lanes, limit.fast_min(reach), reach, scratch, |boundary| {
+            let lanes = found(boundary);
+            done |= lanes;
+            lanes
+        });
+        lanes &= !done & reach.cmp_lt(limit).bits();
+        if whole || lanes == 0 {
+            return effort;
+        }
+        share *= 4.0;
+    }
+}
+
+impl std::ops::AddAssign for Effort {
+    fn add_assign(&mut self, o: Self) {
+        self.met += o.met;
+        self.kept += o.kept;
+        self.events += o.events;
+        self.steps += o.steps;
+    }
+}
+
+/// One sweep over the leaves that begin before `reach`.
+#[inline(always)]
+fn pass<V: Lanes>(
+    solid: &Solid<V::Scalar>,
+    packet: &Packet<V>,
     lanes: u32,
     limit: V,
+    reach: V,
     scratch: &mut Scratch<V::Scalar>,
     mut found: impl FnMut(&Boundary<V>) -> u32,
 ) -> Effort {
     let mut effort = Effort::default();
     let eps = solid.tolerance(packet);
     let limit = limit.fast_min(V::splat(V::Scalar::MAX));
-    let Scratch { met, pruner, program, events, inside, toggled, stack } = scratch;
-    solid.meet(packet, lanes, eps, met, stack);
+    let Scratch { met, pruner, program, events, inside, toggled, stack, crossings } = scratch;
+    solid.meet(packet, lanes, eps, reach, met, stack);
     effort.met = met.len();
     pruner.prune(&solid.tree, met, program);
     effort.kept = met.len();
@@ -139,7 +201,7 @@ pub fn sweep<V: Lanes>(
     let mut pending = 0;
     for (slot, m) in met.iter().enumerate() {
         pending |= m.lanes;
-        solid.boundaries(packet, m, slot as u32, limit + (eps + eps), events);
+        solid.boundaries(packet, m, slot as u32, limit, eps, events, crossings);
     }
     effort.events = events.count;
     pending &= lanes;

@@ -5,7 +5,11 @@
 
 pub mod atomic;
 pub mod exr;
+pub mod heat;
+pub mod metrics;
 pub mod npy;
+pub mod pfm;
+pub mod picture;
 pub mod pix;
 pub mod planes;
 pub mod png;

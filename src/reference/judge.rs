@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::margin::{Id, Located, Margin};
 use super::shapes::{self, Crossing};
+use super::solids::verdict::Trees;
 use super::{Oracle, OracleHit, OracleRay};
 use crate::scene::description::Precision;
 
@@ -22,7 +23,7 @@ pub struct EngineHit {
     pub t: f64,
     /// Triangles: weight of the second corner. Analytic shapes: number of the face.
     pub u: f64,
-    /// Triangles: weight of the third corner. Analytic shapes: 0.
+    /// Triangles: weight of the third corner. Analytic shapes: 0; leaves of solids: 1 where the surface was subtracted.
     pub v: f64,
     /// Primitive number in the instance's object.
     pub prim: u32,
@@ -153,6 +154,10 @@ impl<'a> Case<'a> {
         located.delta(&self.margin, self.ray.org, at)
     }
 
+    fn trees(&self) -> Trees<'_> {
+        Trees { oracle: self.oracle, ray: self.ray, margin: self.margin }
+    }
+
     fn in_segment(&self, t: f64) -> bool {
         self.ray.t_min <= t && t <= self.ray.t_max
     }
@@ -163,6 +168,9 @@ impl<'a> Case<'a> {
         let id = Id { inst: answer.inst, prim: answer.prim };
         if id != (Id { inst: truth.inst, prim: truth.prim }) || !self.in_segment(answer.t) {
             return false;
+        }
+        if let Some(placed) = self.trees().find(id) {
+            return self.trees().agrees(&placed, truth, answer);
         }
         let Some(located) = self.oracle.locate(id) else { return false };
         let delta = self.delta(&located, truth.t);
@@ -194,6 +202,9 @@ impl<'a> Case<'a> {
     /// Rule 1: what was reported is there. The reason if the true ray does not meet it there.
     fn real(&self, answer: &EngineHit) -> Finding<Option<Why>> {
         let id = Id { inst: answer.inst, prim: answer.prim };
+        if let Some(placed) = self.trees().find(id) {
+            return self.trees().real(&placed, answer);
+        }
         let Some(located) = self.oracle.locate(id) else {
             return Err("reported a primitive that does not exist".into());
         };
@@ -247,7 +258,7 @@ impl<'a> Case<'a> {
                 }
             }
         }
-        Ok(reason)
+        Ok(self.trees().skipped(until)?.or(reason))
     }
 
     fn skip_fault(&self, located: &Located, crossing: Crossing, delta: f64) -> String {
@@ -294,6 +305,9 @@ impl<'a> Case<'a> {
     fn grazed(&self) -> Finding<Why> {
         if !self.ray.is_live() {
             return Err("a dead ray was occluded".into());
+        }
+        if let Some(why) = self.trees().grazed() {
+            return Ok(why);
         }
         let near = self.oracle.near(self.ray, &self.margin, 0.0);
         let nearest = near.first().ok_or("nothing within the margin of the segment")?;

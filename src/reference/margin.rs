@@ -34,7 +34,7 @@ impl Margin {
         Self { relative: k * 0.5 * eps, floor: smallest.sqrt() }
     }
 
-    fn delta(&self, scale: f64) -> f64 {
+    pub fn delta(&self, scale: f64) -> f64 {
         (self.relative * scale).max(self.floor)
     }
 }
@@ -224,7 +224,7 @@ impl Oracle {
                 Geometry::Triangle(object.corners(corners).map(|p| placed.to_world.transform_point3(p)))
             }
             Prim::Solid(i) => Geometry::Solid(object.solid(i), object.solid(i).to_local * placed.to_object),
-            Prim::Dropped => return None,
+            Prim::Leaf(_) | Prim::Dropped => return None,
         };
         Some(Located { id, placed, geometry })
     }

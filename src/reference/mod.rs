@@ -34,12 +34,17 @@
 //!    ray leaks, while rays past a silhouette, an open border or a T-junction are.
 //!
 //! Any-hit answers are judged by the same two rules with the segment's end for t.
+//!
+//! Trees of solids are judged as wholes: an answer is explained if rays displaced by at most delta, with boundaries that
+//! are up to the engine's own grouping distance apart taken as one or not, give it (`solids::verdict`).
 
 mod judge;
 mod magnitude;
 mod margin;
 mod object;
 mod shapes;
+mod solids;
+mod spans;
 mod tally;
 mod tree;
 
@@ -97,7 +102,7 @@ pub struct OracleHit {
     pub inst: u32,
     /// Triangles: weight of the second corner. Analytic shapes: number of the face.
     pub u: f64,
-    /// Triangles: weight of the third corner. Analytic shapes: 0.
+    /// Triangles: weight of the third corner. Analytic shapes: 0; leaves of solids: 1 where the surface was subtracted.
     pub v: f64,
     /// Geometric normal in world space, as wound or outward, unnormalised.
     pub ng: DVec3,

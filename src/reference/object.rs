@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 
 use super::shapes::{self, Crossing};
 use super::tree::{Bounds, Tree};
-use super::{OracleRay, Search, magnitude};
+use super::{OracleRay, Search, magnitude, solids};
 use crate::scene::assembly::{AssemblyObject, PartKind};
 use crate::scene::description::Shape;
 
@@ -18,6 +18,8 @@ pub(super) enum Prim {
     Triangle([u32; 3]),
     /// Index into [`Object::solids`].
     Solid(u32),
+    /// A leaf of a tree of solids: index into [`Object::trees`]. Hit as part of its tree, not by itself.
+    Leaf(u32),
     /// Degenerate: never hit.
     Dropped,
 }
@@ -47,6 +49,8 @@ pub(super) struct Object {
     /// Indexed by primitive number.
     prims: Vec<Prim>,
     solids: Vec<Solid>,
+    /// Trees of solids.
+    pub trees: Vec<solids::Tree>,
     tree: Tree,
     /// Largest growth of rounding through a solid's own transform, 1 without solids.
     pub solid_growth: f64,
@@ -67,11 +71,16 @@ impl Object {
                     }
                 }
                 PartKind::Shape(shape) => object.push_solid(*shape, part.to_object),
-                PartKind::Solids(tree) => object.prims.extend(tree.leaves.iter().map(|_| Prim::Dropped)),
+                PartKind::Solids(flat) => {
+                    let tree = solids::Tree::new(part.first_prim, flat, &part.to_object);
+                    let leaf = Prim::Leaf(object.trees.len() as u32);
+                    object.prims.extend((0..tree.leaf_count()).map(|_| leaf));
+                    object.trees.push(tree);
+                }
             }
         }
         let count = object.prims.len() as u32;
-        let items = (0..count).filter(|&i| !matches!(object.prims[i as usize], Prim::Dropped)).collect();
+        let items = (0..count).filter(|&i| object.is_alone(i)).collect();
         object.tree = match search {
             Search::Brute => Tree::flat(items),
             Search::Tree => Tree::build(items, |i| object.prim_bounds(i)),
@@ -93,6 +102,11 @@ impl Object {
         self.solids.push(Solid { shape, to_object, to_local });
     }
 
+    /// Whether primitive `prim` is hit by itself.
+    fn is_alone(&self, prim: u32) -> bool {
+        matches!(self.prim(prim), Prim::Triangle(_) | Prim::Solid(_))
+    }
+
     /// The primitive numbered `prim`; [`Prim::Dropped`] also beyond the last.
     pub fn prim(&self, prim: u32) -> Prim {
         self.prims.get(prim as usize).copied().unwrap_or(Prim::Dropped)
@@ -111,14 +125,15 @@ impl Object {
         match self.prim(prim) {
             Prim::Triangle(corners) => Bounds::of(self.corners(corners)),
             Prim::Solid(i) => self.solids[i as usize].bounds(),
-            Prim::Dropped => Bounds::EMPTY,
+            Prim::Leaf(_) | Prim::Dropped => Bounds::EMPTY,
         }
     }
 
     /// Box of all primitives that can be hit, `None` if there is none.
     pub fn bounds(&self) -> Option<Bounds> {
-        let live = (0..self.prims.len() as u32).filter(|&i| !matches!(self.prim(i), Prim::Dropped));
-        live.map(|i| self.prim_bounds(i)).reduce(Bounds::union)
+        let live = (0..self.prims.len() as u32).filter(|&i| self.is_alone(i));
+        let trees = self.trees.iter().map(|t| t.bounds).filter(|b| b.lo.x <= b.hi.x);
+        live.map(|i| self.prim_bounds(i)).chain(trees).reduce(Bounds::union)
     }
 
     /// Crossings of the ray's line with one primitive, in order of t.
@@ -133,7 +148,7 @@ impl Object {
                 let local = ray.transformed(&solid.to_local);
                 shapes::crossings(solid.shape, local.org, local.dir).map(|c| c.map(|c| solid.hit(&local, c)))
             }
-            Prim::Dropped => [None; 2],
+            Prim::Leaf(_) | Prim::Dropped => [None; 2],
         }
     }
 
@@ -142,7 +157,7 @@ impl Object {
         let mut best: Option<(u32, LocalHit)> = None;
         let org = ray.org.abs().max_element();
         let pad = |b: &Bounds| BOX_PAD * (b.magnitude().max_element() + org);
-        self.tree.visit(ray, t_max, pad, |prim, end| {
+        let mut end = self.tree.visit(ray, t_max, pad, |prim, end| {
             let in_segment = |hit: &LocalHit| ray.t_min <= hit.t && hit.t <= end;
             let Some(hit) = self.crossings(prim, ray).into_iter().flatten().find(in_segment) else { return end };
             if best.is_none_or(|(p, b)| hit.t < b.t || (hit.t == b.t && prim < p)) {
@@ -150,6 +165,19 @@ impl Object {
             }
             hit.t
         });
+        for tree in &self.trees {
+            if tree.bounds.entry(ray, end, pad(&tree.bounds)).is_none() && tree.bounds.is_finite() {
+                continue;
+            }
+            let boundaries = tree.boundaries(ray, 0.0);
+            let Some(first) = boundaries.iter().find(|b| ray.t_min <= b.t && b.t <= end) else { continue };
+            let prim = tree.first_prim + first.leaf;
+            if best.is_none_or(|(p, b)| first.t < b.t || prim < p) {
+                let (ng, v) = (tree.normal(ray, first), f64::from(first.turned));
+                best = Some((prim, LocalHit { t: first.t, u: f64::from(first.face), v, face: first.face, ng }));
+                end = first.t;
+            }
+        }
         best
     }
 

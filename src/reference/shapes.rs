@@ -5,6 +5,8 @@
 
 use glam::{DVec2, DVec3};
 
+pub(super) use super::spans::Crossing;
+use super::spans::{Span, cuboid, quadric, slab};
 use crate::scene::description::Shape;
 
 /// A line closer than this to a triangle's plane (sine of the angle) counts as parallel to it.
@@ -21,13 +23,6 @@ pub(super) struct TriangleCrossing {
     pub v: f64,
     /// Cross product of the edges from corner 0, unnormalised.
     pub ng: DVec3,
-}
-
-/// Where a line meets an analytic shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Crossing {
-    pub t: f64,
-    pub face: u32,
 }
 
 /// First and second crossing in order of t.
@@ -81,76 +76,6 @@ pub(super) fn triangle(corners: [DVec3; 3], org: DVec3, dir: DVec3) -> Option<Tr
     (hit.u >= -fat_u && hit.v >= -fat_v && hit.u + hit.v <= 1.0 + fat_u + fat_v).then_some(hit)
 }
 
-/// The part of a line inside something convex, with the faces at its ends.
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    enter: Crossing,
-    leave: Crossing,
-}
-
-impl Span {
-    fn new(t0: f64, t1: f64, face0: u32, face1: u32) -> Self {
-        Self { enter: Crossing { t: t0, face: face0 }, leave: Crossing { t: t1, face: face1 } }
-    }
-
-    fn all() -> Self {
-        Self::new(f64::NEG_INFINITY, f64::INFINITY, 0, 0)
-    }
-
-    /// The common part; the faces of `self` win where ends coincide.
-    fn and(self, other: Self) -> Option<Self> {
-        let enter = if other.enter.t > self.enter.t { other.enter } else { self.enter };
-        let leave = if other.leave.t < self.leave.t { other.leave } else { self.leave };
-        (enter.t <= leave.t).then_some(Self { enter, leave })
-    }
-
-    fn length(&self) -> f64 {
-        self.leave.t - self.enter.t
-    }
-}
-
-/// Where `lo <= org + t dir <= hi` on one axis; `low` and `high` are the faces there.
-fn slab(org: f64, dir: f64, lo: f64, hi: f64, low: u32, high: u32) -> Option<Span> {
-    let (t_lo, t_hi) = ((lo - org) / dir, (hi - org) / dir);
-    match dir {
-        d if d > 0.0 => Some(Span::new(t_lo, t_hi, low, high)),
-        d if d < 0.0 => Some(Span::new(t_hi, t_lo, high, low)),
-        _ => (lo <= org && org <= hi).then(Span::all),
-    }
-}
-
-/// The box [-half, half]^3 with faces 0..5 = -x, +x, -y, +y, -z, +z.
-fn cuboid(org: DVec3, dir: DVec3, half: f64) -> Option<Span> {
-    let mut span = Span::all();
-    for axis in 0..3 {
-        let face = 2 * axis as u32;
-        span = slab(org[axis], dir[axis], -half, half, face, face + 1)?.and(span)?;
-    }
-    Some(span)
-}
-
-/// Where `a t^2 + 2 b t + c <= 0`, face 0: one span, or two unbounded ones when a < 0.
-fn quadric(a: f64, b: f64, c: f64) -> [Option<Span>; 2] {
-    let half_line = |t0, t1| Some(Span::new(t0, t1, 0, 0));
-    let (inf, disc) = (f64::INFINITY, b * b - a * c);
-    if a == 0.0 {
-        let t = -c / (2.0 * b);
-        return match b {
-            b if b > 0.0 => [half_line(-inf, t), None],
-            b if b < 0.0 => [half_line(t, inf), None],
-            _ => [(c <= 0.0).then(Span::all), None],
-        };
-    }
-    if disc < 0.0 {
-        return [(a < 0.0).then(Span::all), None];
-    }
-    // One root has no cancellation, the other follows from their product c / a.
-    let q = -(b + disc.sqrt().copysign(b));
-    let (r, s) = (q / a, if q == 0.0 { 0.0 } else { c / q });
-    let (lo, hi) = (r.min(s), r.max(s));
-    if a > 0.0 { [half_line(lo, hi), None] } else { [half_line(-inf, lo), half_line(hi, inf)] }
-}
-
 /// The part of the line inside a solid whose canonical form lies in [-1, 1]^3.
 fn solid(shape: Shape, org: DVec3, dir: DVec3) -> Option<Span> {
     // From far away the quadratics would cancel: start in the middle of the line's way through a box around it.
@@ -180,8 +105,7 @@ fn solid(shape: Shape, org: DVec3, dir: DVec3) -> Option<Span> {
             pieces.max_by(|p, q| p.length().total_cmp(&q.length()))
         }
     }?;
-    let moved = |c: Crossing| Crossing { t: c.t + shift, ..c };
-    Some(Span { enter: moved(span.enter), leave: moved(span.leave) })
+    Some(span.moved(shift))
 }
 
 /// The line's crossings with the surface of `shape`, in order of t, both in the shape's canonical space.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::span::{Solid, Span};
-use crate::lanes::{LaneMask, Lanes, Lanes3, finite_rcp};
+use crate::lanes::{Lanes, Lanes3};
 
 /// The canonical box. Faces: 0..=5 for -x, +x, -y, +y, -z, +z.
 #[derive(Clone, Copy, Debug)]
@@ -15,19 +15,8 @@ impl Solid for Cuboid {
 
     #[inline(always)]
     fn span<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, _: V::Scalar) -> Span<V> {
-        let slab = |axis: usize| {
-            let rcp = finite_rcp(d[axis]);
-            let (low, high) = ((V::constant(-1.0) - o[axis]) * rcp, (V::constant(1.0) - o[axis]) * rcp);
-            let forward = low.cmp_le(high);
-            let (low_face, high_face) = (V::constant(2.0 * axis as f64), V::constant(2.0 * axis as f64 + 1.0));
-            Span {
-                hit: V::Mask::from_bits(V::ALL),
-                t_in: V::select(forward, low, high),
-                t_out: V::select(forward, high, low),
-                face_in: V::select(forward, low_face, high_face),
-                face_out: V::select(forward, high_face, low_face),
-            }
-        };
+        let sides = [V::constant(-1.0), V::constant(1.0)];
+        let slab = |axis: usize| Span::slab(o[axis], d[axis], sides, [2.0 * axis as f64, 2.0 * axis as f64 + 1.0]);
         slab(0).intersect(&slab(1)).intersect(&slab(2))
     }
 

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::span::{Span, infinite, nearest_to_origin};
-use crate::lanes::{LaneMask, Lanes, Lanes3, finite_rcp};
+use crate::lanes::{LaneMask, Lanes, Lanes3};
 
 /// Spans of lines inside x^2 + y^2 <= g(z), 0 <= z <= 1; g by its coefficients of 1, z, z^2.
 #[inline(always)]
@@ -22,17 +22,7 @@ pub fn round<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, g: [V::Scalar; 3], mut emit: 
 #[inline(always)]
 pub fn trough<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, g: [V::Scalar; 3], mut emit: impl FnMut(Span<V>)) {
     let (o, shift) = nearest_to_origin(o, d);
-    let rcp = finite_rcp(d[0]);
-    let (low, high) = ((V::constant(-1.0) - o[0]) * rcp, (V::constant(1.0) - o[0]) * rcp);
-    let forward = low.cmp_le(high);
-    let (low_face, high_face) = (V::constant(3.0), V::constant(4.0));
-    let sides = Span {
-        hit: V::Mask::from_bits(V::ALL),
-        t_in: V::select(forward, low, high),
-        t_out: V::select(forward, high, low),
-        face_in: V::select(forward, low_face, high_face),
-        face_out: V::select(forward, high_face, low_face),
-    };
+    let sides = Span::slab(o[0], d[0], [V::constant(-1.0), V::constant(1.0)], [3.0, 4.0]);
     let ends = Span::unit_slab(o[2], d[2]).intersect(&sides);
     let squares = [d[1] * d[1], o[1] * d[1], o[1] * o[1]];
     pieces(squares, o[2], d[2], g, |side| emit(side.intersect(&ends).shifted(shift)));

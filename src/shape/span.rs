@@ -64,20 +64,29 @@ impl<V: Lanes> Span<V> {
         Self { t_in: self.t_in + by, t_out: self.t_out + by, ..*self }
     }
 
+    /// Where a line is between two parallel planes: `lo <= o + t d <= hi`, with the faces there. A line along them is
+    /// between them for ever or never; also one within a plane, which the reciprocal alone would cut in two.
+    #[inline(always)]
+    pub fn slab(o: V, d: V, [lo, hi]: [V; 2], [low, high]: [f64; 2]) -> Self {
+        let rcp = crate::lanes::finite_rcp(d);
+        let level = d.abs().cmp_lt(V::splat(V::Scalar::MIN_POSITIVE));
+        let first = V::select(level, -infinite::<V>(), (lo - o) * rcp);
+        let second = V::select(level, infinite(), (hi - o) * rcp);
+        let up = first.cmp_le(second);
+        let (low, high) = (V::constant(low), V::constant(high));
+        Self {
+            hit: (!level | (lo.cmp_le(o) & o.cmp_le(hi))) & V::Mask::from_bits(V::ALL),
+            t_in: V::select(up, first, second),
+            t_out: V::select(up, second, first),
+            face_in: V::select(up, low, high),
+            face_out: V::select(up, high, low),
+        }
+    }
+
     /// The slab `0 <= z <= 1`; faces 1 (z = 0) and 2 (z = 1).
     #[inline(always)]
     pub fn unit_slab(oz: V, dz: V) -> Self {
-        let rcp = crate::lanes::finite_rcp(dz);
-        let (bottom, top) = ((V::constant(0.0) - oz) * rcp, (V::constant(1.0) - oz) * rcp);
-        let up = bottom.cmp_le(top);
-        let (one, two) = (V::constant(1.0), V::constant(2.0));
-        Self {
-            hit: V::Mask::from_bits(V::ALL),
-            t_in: V::select(up, bottom, top),
-            t_out: V::select(up, top, bottom),
-            face_in: V::select(up, one, two),
-            face_out: V::select(up, two, one),
-        }
+        Self::slab(oz, dz, [V::constant(0.0), V::constant(1.0)], [1.0, 2.0])
     }
 }
 

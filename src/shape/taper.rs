@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::quartic;
 use super::span::{Span, nearest_to_origin};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, finite_rcp};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
 
 /// How much wider than the solid the interval is in which roots are looked for.
 const ROOM: f64 = 1.0 / 256.0;
@@ -31,9 +31,7 @@ pub fn taper<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, [x, y]: [V::Scalar; 2], mut e
     let mut within = Span::unit_slab(o[2], d[2]);
     for (axis, top) in [(0, x), (1, y)] {
         let wide = V::splat(S::<V>::ONE.fast_max(top)) * V::constant(1.0 + ROOM);
-        let rcp = finite_rcp(d[axis]);
-        let (low, high) = ((-wide - o[axis]) * rcp, (wide - o[axis]) * rcp);
-        within = within.intersect(&Span::plain(within.hit, low.fast_min(high), low.fast_max(high)));
+        within = within.intersect(&Span::slab(o[axis], d[axis], [-wide, wide], [0.0, 0.0]));
     }
     if !within.hit.any() {
         return;

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::quartic;
 use super::span::{Span, nearest_to_origin};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot, finite_rcp};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot};
 
 /// How much wider than the solid the interval is in which roots are looked for: its ends are outside.
 const ROOM: f64 = 1.0 / 256.0;
@@ -20,11 +20,10 @@ pub fn torus<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, minor: V::Scalar, mut emit: i
     let ball = (V::constant(1.0) + minor) * wide;
     let room = ball.mul_add(ball, -dot(o, o));
     let chord = (room / dot(d, d)).sqrt();
-    let rcp = finite_rcp(d[2]);
     let flat = minor * wide;
-    let (z0, z1) = ((-flat - o[2]) * rcp, (flat - o[2]) * rcp);
-    let (from, to) = (z0.fast_min(z1).fast_max(-chord), z0.fast_max(z1).fast_min(chord));
-    let met = V::constant(0.0).cmp_lt(room) & from.cmp_lt(to);
+    let slab = Span::slab(o[2], d[2], [-flat, flat], [0.0, 0.0]);
+    let (from, to) = (slab.t_in.fast_max(-chord), slab.t_out.fast_min(chord));
+    let met = slab.hit & V::constant(0.0).cmp_lt(room) & from.cmp_lt(to);
     if !met.any() {
         return;
     }

@@ -1,7 +1,7 @@
 //! Trees of solids against a packet: the nearest boundary at or after the segment's start.
 
 use super::query::Query;
-use crate::csg::{self, Boundary, Effort};
+use crate::csg::{self, Boundary, Depth, Effort};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::slab::Interval;
 use crate::ray::{Candidate, Packet};
@@ -27,13 +27,14 @@ pub fn trace<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
     let mut scratch = std::mem::take(&mut query.stack.solids);
     let limit = query.hit.t;
-    let effort = csg::sweep(&placed.solid, packet, wanted, limit, &mut scratch, |boundary| {
-        let found = candidate(packet, &interval, boundary);
-        let prim = placed.first_prim + placed.solid.number(boundary.leaf);
-        query.take(boundary.lanes, &found, prim, inst);
-        // What lies beyond the end of a segment ends the lane too.
-        found.hit.bits() & boundary.lanes
-    });
+    let effort =
+        csg::sweep(&placed.solid, packet, (wanted, &interval), limit, Depth::FrontFirst, &mut scratch, |boundary| {
+            let found = candidate(packet, &interval, boundary);
+            let prim = placed.first_prim + placed.solid.number(boundary.leaf);
+            query.take(boundary.lanes, &found, prim, inst);
+            // What lies beyond the end of a segment ends the lane too.
+            found.hit.bits() & boundary.lanes
+        });
     query.stack.solids = scratch;
     if COUNT {
         count(query, wanted, &effort);

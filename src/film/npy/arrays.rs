@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::film::{input, write_atomically};
 use crate::lanes::Real;
 use crate::ray::{Hits, Rays};
+use crate::trace::Stretch;
 
 /// Bytes read at a time.
 const CHUNK: usize = 1 << 16;
@@ -220,6 +221,24 @@ pub fn write_occlusion<B: AsRef<[u8]>>(path: &Path, batches: impl IntoIterator<I
     write_array(path, &Descr::Plain("|u1".to_owned()), &[], batches, |batch: &B, bytes| {
         bytes.extend_from_slice(batch.as_ref());
         batch.as_ref().len()
+    })
+}
+
+/// Writes a file of stretches of rays inside solids: records `t_in f8, t_out f8, ray u4, inst u4, prim_in u4, prim_out u4`
+/// in the order of `stretches`.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_stretches(path: &Path, stretches: &[Stretch]) -> Result<u64> {
+    let numbers = ["t_in", "t_out"].map(|name| (name.to_owned(), "<f8".to_owned()));
+    let ids = ["ray", "inst", "prim_in", "prim_out"].map(|name| (name.to_owned(), "<u4".to_owned()));
+    let descr = Descr::Record(numbers.into_iter().chain(ids).collect());
+    write_array(path, &descr, &[], stretches.chunks(4096), |chunk: &&[Stretch], bytes| {
+        for s in *chunk {
+            bytes.extend([s.t_in, s.t_out].into_iter().flat_map(f64::to_le_bytes));
+            bytes.extend([s.ray, s.inst, s.prim_in, s.prim_out].into_iter().flat_map(u32::to_le_bytes));
+        }
+        chunk.len()
     })
 }
 

@@ -6,10 +6,14 @@
 
 use glam::DVec3;
 
-use super::super::shapes::{self, Crossing, Span};
+use super::super::shapes;
+use super::super::spans::{self, Crossing, Span};
 use crate::scene::description::Shape;
+use crate::scene::mesh::Mesh;
 use crate::scene::solids::{Polyhedron, Solid};
 
+/// Crossings of a mesh closer than this relative to coordinates are one.
+const SAME_EDGE: f64 = 1e-13;
 /// Intervals shorter than this (units of the canonical solid) are looked through no further.
 const FINEST: f64 = 1e-7;
 
@@ -26,6 +30,7 @@ pub(super) fn intervals(solid: &Solid, org: DVec3, dir: DVec3) -> Vec<Span> {
         Solid::Taper { x, y } => taper([*x, *y], org, dir),
         Solid::Round { profile } => curved(*profile, false, org, dir),
         Solid::Trough { profile } => curved(*profile, true, org, dir),
+        Solid::Mesh(mesh) => meshed(mesh, org, dir),
     }
 }
 
@@ -46,7 +51,41 @@ pub(super) fn normal(solid: &Solid, face: u32, p: DVec3) -> DVec3 {
         }
         Solid::Round { profile: [_, g1, g2] } => DVec3::new(2.0 * p.x, 2.0 * p.y, -(g1 + 2.0 * g2 * p.z)),
         Solid::Trough { profile: [_, g1, g2] } => DVec3::new(0.0, 2.0 * p.y, -(g1 + 2.0 * g2 * p.z)),
+        Solid::Mesh(mesh) => {
+            let [a, b, c] = mesh.corners(face as usize);
+            shapes::cross(b - a, c - a)
+        }
     }
+}
+
+/// The inside of a closed mesh, by the number of surfaces around a point: every crossing adds or takes one, and a crossing of
+/// an edge, seen by the triangles on both its sides, counts once.
+fn meshed(mesh: &Mesh, org: DVec3, dir: DVec3) -> Vec<Span> {
+    let mut ends: Vec<(f64, bool, u32)> = Vec::new();
+    for i in 0..mesh.triangles.len() {
+        let corners = mesh.corners(i);
+        if let Some(hit) = shapes::triangle(corners, org, dir).filter(|_| shapes::is_proper(corners)) {
+            ends.push((hit.t, hit.ng.dot(dir) < 0.0, i as u32));
+        }
+    }
+    ends.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+    let size = mesh.bounds().map_or(0.0, |(lo, hi)| lo.abs().max(hi.abs()).max_element()) + org.abs().max_element();
+    let apart = SAME_EDGE * size / dir.length();
+    let mut spans: Vec<Span> = Vec::new();
+    let mut entered: Option<(f64, u32)> = None;
+    for group in ends.chunk_by(|a, b| b.0 - a.0 <= apart) {
+        let (t, _, face) = group[0];
+        let way = |enters: bool| group.iter().any(|e| e.1 == enters);
+        match (entered, way(true), way(false)) {
+            (None, true, false) => entered = Some((t, face)),
+            (Some((t_in, face_in)), false, true) => {
+                spans.push(Span::new(t_in, t, face_in, face));
+                entered = None;
+            }
+            _ => {}
+        }
+    }
+    spans
 }
 
 /// Where `n . p <= d` with `at` = n . org - d and `speed` = n . dir.
@@ -80,12 +119,12 @@ fn curved([g0, g1, g2]: [f64; 3], drawn: bool, org: DVec3, dir: DVec3) -> Vec<Sp
     let a = squares(dir, dir) - g2 * dir.z * dir.z;
     let b = squares(org, dir) - 0.5 * (g1 + 2.0 * g2 * org.z) * dir.z;
     let c = squares(org, org) - (g0 + g1 * org.z + g2 * org.z * org.z);
-    let mut ends = shapes::slab(org.z, dir.z, 0.0, 1.0, 1, 2);
+    let mut ends = spans::slab(org.z, dir.z, 0.0, 1.0, 1, 2);
     if drawn {
-        ends = ends.and_then(|ends| shapes::slab(org.x, dir.x, -1.0, 1.0, 3, 4)?.and(ends));
+        ends = ends.and_then(|ends| spans::slab(org.x, dir.x, -1.0, 1.0, 3, 4)?.and(ends));
     }
     let Some(ends) = ends else { return Vec::new() };
-    let pieces = shapes::quadric(a, b, c).into_iter().flatten();
+    let pieces = spans::quadric(a, b, c).into_iter().flatten();
     pieces.filter_map(|side| side.and(ends)).map(|s| s.moved(shift)).collect()
 }
 
@@ -139,10 +178,10 @@ fn bisected(f: &impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
 
 /// Between the ends the solid is where x^2 b(z)^2 + y^2 a(z)^2 <= a(z)^2 b(z)^2.
 fn taper([x, y]: [f64; 2], org: DVec3, dir: DVec3) -> Vec<Span> {
-    let ends = shapes::slab(org.z, dir.z, 0.0, 1.0, 1, 2);
+    let ends = spans::slab(org.z, dir.z, 0.0, 1.0, 1, 2);
     let wide = |top: f64| 1.01 * top.max(1.0);
-    let x_slab = shapes::slab(org.x, dir.x, -wide(x), wide(x), 9, 9);
-    let y_slab = shapes::slab(org.y, dir.y, -wide(y), wide(y), 9, 9);
+    let x_slab = spans::slab(org.x, dir.x, -wide(x), wide(x), 9, 9);
+    let y_slab = spans::slab(org.y, dir.y, -wide(y), wide(y), 9, 9);
     let within = ends.zip(x_slab).zip(y_slab).and_then(|((e, x), y)| e.and(x)?.and(y));
     let Some(within) = within else { return Vec::new() };
     let (from, length) = (within.enter.t, within.leave.t - within.enter.t);
@@ -205,7 +244,11 @@ fn roots(p: &[f64]) -> Vec<f64> {
         cuts.append(&mut found);
         cuts.push(1.0);
         let f = |s: f64| value(p, s);
-        found = cuts.windows(2).filter(|c| (f(c[0]) <= 0.0) != (f(c[1]) <= 0.0)).map(|c| bisected(&f, c[0], c[1])).collect();
+        found = cuts
+            .windows(2)
+            .filter(|c| (f(c[0]) <= 0.0) != (f(c[1]) <= 0.0))
+            .map(|c| bisected(&f, c[0], c[1]))
+            .collect();
     }
     found
 }
@@ -232,8 +275,10 @@ mod tests {
         close(&ts(&torus, [1.0, 0.0, 2.0], [0.0, 0.0, -4.0]), &[(0.4375, 0.5625)]);
         close(&ts(&torus, [0.0, 0.0, 2.0], [0.0, 0.0, -1.0]), &[]);
         // Along the inner equator's tangent: enters where x^2 + 0.75^2 = 1.25^2.
-        close(&ts(&torus, [-3.0, 0.76, 0.0], [1.0, 0.0, 0.0]).into_iter().take(1).map(|s| (s.0, 0.0)).collect::<Vec<_>>(),
-            &[(3.0 - (1.25f64 * 1.25 - 0.76 * 0.76).sqrt(), 0.0)]);
+        close(
+            &ts(&torus, [-3.0, 0.76, 0.0], [1.0, 0.0, 0.0]).into_iter().take(1).map(|s| (s.0, 0.0)).collect::<Vec<_>>(),
+            &[(3.0 - (1.25f64 * 1.25 - 0.76 * 0.76).sqrt(), 0.0)],
+        );
         let placed = placed_torus(DVec3::ZERO, DVec3::Z, 2.0, 0.5).unwrap();
         assert!(matches!(placed.solid, Solid::Torus { minor } if minor == 0.25));
     }

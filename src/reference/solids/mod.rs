@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 
-use super::shapes::{self, Span};
+use super::spans::{Crossing, Span};
 use super::tree::Bounds;
 use super::{OracleRay, magnitude};
 use crate::scene::solids::Solid;
@@ -122,9 +122,9 @@ impl Tree {
         (0..self.leaves.len() as u32).filter(move |&i| meets(&self.leaves[i as usize]))
     }
 
-    /// Boundaries of the whole on the line of `ray` (object space), in order; those closer than the tree's tolerance or
-    /// `at_least` (a distance) are one.
-    pub fn boundaries(&self, ray: &OracleRay, at_least: f64) -> Vec<Boundary> {
+    /// Boundaries of the whole on the line of `ray` (object space), in order; those closer than the tree's tolerance
+    /// plus `more` (distances in object space) are one.
+    pub fn boundaries(&self, ray: &OracleRay, more: f64) -> Vec<Boundary> {
         let mut inside_of: Vec<(u32, Vec<Span>)> = Vec::new();
         let mut ends: Vec<End> = Vec::new();
         let mut size = ray.org.abs().max_element();
@@ -141,7 +141,7 @@ impl Tree {
             }
         }
         ends.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.leaf.cmp(&b.leaf)));
-        let apart = self.tolerance.max(at_least).max(OWN * size) / ray.dir.abs().max_element();
+        let apart = (self.tolerance + more).max(OWN * size) / ray.dir.abs().max_element();
         let mut groups: Vec<&[End]> = Vec::new();
         let mut rest = ends.as_slice();
         while let Some(first) = rest.first() {
@@ -194,9 +194,7 @@ impl Tree {
             }
             other
         };
-        let alone = |leaf: u32| {
-            whole(&without(after, leaf)) != enters || whole(&without(before, leaf)) == enters
-        };
+        let alone = |leaf: u32| whole(&without(after, leaf)) != enters || whole(&without(before, leaf)) == enters;
         let changed = group.iter().filter(|e| has(before, e.leaf) != has(after, e.leaf));
         let end = changed.min_by_key(|e| (!alone(e.leaf), e.leaf))?;
         let turned = has(after, end.leaf) != enters;
@@ -228,13 +226,13 @@ impl Leaf {
             Solid::Torus { minor } => 4.0 / minor,
             Solid::Taper { .. } => 16.0,
             Solid::Round { .. } | Solid::Trough { .. } => 4.0,
-            Solid::Shape(_) | Solid::Polyhedron(_) => 1.0,
+            Solid::Shape(_) | Solid::Polyhedron(_) | Solid::Mesh(_) => 1.0,
         };
         object.max_element() * loss
     }
 }
 
-/// Ends of a leaf's intervals, for the judge.
-fn ends(spans: &[Span]) -> Vec<shapes::Crossing> {
+/// Ends of intervals, in order: the even ones enter.
+fn ends(spans: &[Span]) -> Vec<Crossing> {
     spans.iter().flat_map(|s| [s.enter, s.leave]).collect()
 }

@@ -8,7 +8,8 @@ use super::kdl::{self, meshes::MeshFiles};
 use crate::error::{Error, Result, nearest_name};
 
 /// Names for `builtin:NAME`, in the order they are listed.
-pub const NAMES: [&str; 6] = ["teaching", "sphere-flake", "cornell", "gallery", "terrain", "forest"];
+pub const NAMES: [&str; 10] =
+    ["teaching", "sphere-flake", "cornell", "gallery", "terrain", "forest", "bolt", "die", "rook", "sponge"];
 
 /// The text of built-in scene `name`, in lanecast's scene format.
 pub fn text(name: &str) -> Option<&'static str> {
@@ -19,6 +20,10 @@ pub fn text(name: &str) -> Option<&'static str> {
         "gallery" => include_str!("../../../scenes/gallery.kdl"),
         "terrain" => include_str!("../../../scenes/terrain.kdl"),
         "forest" => include_str!("../../../scenes/forest.kdl"),
+        "bolt" => include_str!("../../../scenes/bolt.kdl"),
+        "die" => include_str!("../../../scenes/die.kdl"),
+        "rook" => include_str!("../../../scenes/rook.kdl"),
+        "sponge" => include_str!("../../../scenes/sponge.kdl"),
         _ => return None,
     })
 }

@@ -250,6 +250,15 @@ impl<'a, 'n> Lowering<'a, 'n> {
 
     /// `mesh "file.ply" units=mm`.
     fn mesh_file(&mut self, node: &'n Node<'a>, place: Place) -> Result<()> {
+        let (mesh, scale, place) = self.mesh_of(node, place)?;
+        self.add(ItemKind::Mesh(mesh), scale, place, node.span)
+    }
+
+    /// The mesh of a `mesh` statement, the scale of its unit, where it goes.
+    ///
+    /// # Errors
+    /// The first thing that is wrong in the statement or the file.
+    pub fn mesh_of(&mut self, node: &'n Node<'a>, place: Place) -> Result<(u32, DAffine3, Place)> {
         const ALLOWED: [&str; 2] = ["units", "material"];
         let fields = self.fields(node, &ALLOWED, &transform::NAMES)?;
         let (written, span) = fields.title()?.ok_or_else(|| fields.error("expected `mesh \"file.ply\"`"))?;
@@ -268,7 +277,7 @@ impl<'a, 'n> Lowering<'a, 'n> {
             Some(mesh) => mesh,
             None => self.read_mesh(written, span)?,
         };
-        self.add(ItemKind::Mesh(mesh), DAffine3::from_scale(glam::DVec3::splat(scale)), place, node.span)
+        Ok((mesh, DAffine3::from_scale(glam::DVec3::splat(scale)), place))
     }
 
     fn read_mesh(&mut self, written: &str, span: Span) -> Result<u32> {

@@ -68,11 +68,18 @@ impl<'a, 'n> Lowering<'a, 'n> {
         match node.name.as_ref() {
             "instance" => self.solid_instance(node, building),
             "group" => self.operation(node, building),
+            "mesh" => {
+                let (mesh, scale, place) = self.mesh_of(node, Place::root_of(0))?;
+                self.count_item(node.span)?;
+                let (transform, material) = place.parts();
+                let kind = NodeKind::Solid(Solid::Mesh(self.store.meshes[mesh as usize].clone()));
+                Ok(building.tree.add(SolidNode { transform: transform * scale, material, kind }))
+            }
             name if OPERATIONS.contains(&name) => self.operation(node, building),
             name if SOLIDS.contains(&name) || shapes::NAMES.contains(&name) => self.leaf(node, building),
             _ => {
                 let known = OPERATIONS.iter().chain(&SOLIDS).chain(&shapes::NAMES).copied();
-                let known = known.chain(["group", "instance", "repeat", "choose"]);
+                let known = known.chain(["mesh", "group", "instance", "repeat", "choose"]);
                 let what = format!("{} is no solid that can be combined", quote(&node.name));
                 Err(self.scope.source.error_near(node.span, what, &node.name, known))
             }

@@ -25,6 +25,7 @@ impl Solid {
                 about_axis(reach, reach)
             }
             Self::Trough { profile } => about_axis(1.0, widest(profile)),
+            Self::Mesh(mesh) => mesh.bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO)),
         }
     }
 }

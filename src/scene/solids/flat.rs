@@ -1,11 +1,13 @@
 //! Lowering a tree of solids: numbered leaves with their whole transform, and the operations in postfix order.
 
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use super::{NodeId, NodeKind, Solid, SolidTree};
 use crate::scene::description::{MaterialId, Shape};
+use crate::scene::mesh::Mesh;
 
 /// Most leaves a tree may expand to.
 pub const MAX_LEAVES: usize = 1 << 21;
@@ -26,6 +28,8 @@ pub struct FlatTree {
     pub steps: Vec<Step>,
     /// See [`SolidTree::tolerance`].
     pub tolerance: f64,
+    /// Meshes that were seen to be closed, by their address while the tree is lowered.
+    closed: HashSet<usize>,
 }
 
 /// A leaf.
@@ -152,6 +156,11 @@ impl FlatTree {
                 return Err(format!("the transform of node {id} cannot be inverted or is not finite"));
             }
             check(solid).map_err(|what| format!("node {id}: {what}"))?;
+            if let Solid::Mesh(mesh) = solid
+                && self.closed.insert(Arc::as_ptr(mesh) as usize)
+            {
+                closed(mesh).map_err(|what| format!("node {id}: {what}"))?;
+            }
             if self.leaves.len() >= MAX_LEAVES {
                 return Err(format!("it expands to more than {MAX_LEAVES} solids"));
             }
@@ -191,6 +200,33 @@ fn check(solid: &Solid) -> Result<(), String> {
     }
 }
 
+/// Refuses a mesh that has a border: every edge must be gone along as often one way as the other. Corners at one place are
+/// one corner, whatever their numbers.
+fn closed(mesh: &Mesh) -> Result<(), String> {
+    if mesh.triangles.is_empty() || !mesh.positions.iter().all(|p| p.is_finite()) {
+        return Err("a mesh without triangles or with corners that are not finite has no inside".into());
+    }
+    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
+    let place = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
+    let corner: Vec<u32> =
+        mesh.positions.iter().zip(0..).map(|(p, i)| *first_at.entry(place(*p)).or_insert(i)).collect();
+    let mut balance: HashMap<(u32, u32), i64> = HashMap::new();
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|i| corner[i as usize]);
+        for (a, b) in [(a, b), (b, c), (c, a)] {
+            *balance.entry((a.min(b), a.max(b))).or_default() += if a < b { 1 } else { -1 };
+        }
+    }
+    let open = balance.iter().filter(|((a, b), way)| a != b && **way != 0).map(|(edge, _)| *edge).min();
+    match open {
+        None => Ok(()),
+        Some((a, b)) => {
+            let [a, b] = [a, b].map(|i| mesh.positions[i as usize]);
+            Err(format!("the mesh is not closed: the edge from {a} to {b} has triangles on one side only"))
+        }
+    }
+}
+
 /// Lowers a tree behind an [`Arc`], for who shares it.
 ///
 /// # Errors
@@ -203,7 +239,6 @@ pub fn flatten(tree: &SolidTree) -> Result<Arc<FlatTree>, String> {
 mod tests {
     use super::super::{SolidNode, ball};
     use super::*;
-    use glam::DVec3;
 
     fn unit_ball(tree: &mut SolidTree) -> NodeId {
         tree.solid(ball(DVec3::ZERO, 1.0).unwrap())
@@ -255,6 +290,19 @@ mod tests {
             assert!(FlatTree::new(&flat).unwrap_err().contains("inverted"), "{scale}");
         }
         assert!(FlatTree::new(&SolidTree::new("empty")).is_err());
+    }
+
+    #[test]
+    fn meshes_must_be_closed() {
+        let [o, x, y, z] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let mut mesh = Mesh { positions: vec![o, x, y, z], ..Mesh::default() };
+        mesh.triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2]];
+        assert!(closed(&mesh).unwrap_err().contains("not closed"));
+        mesh.triangles.push([1, 2, 3]);
+        assert!(closed(&mesh).is_ok());
+        mesh.triangles[3] = [1, 3, 2];
+        assert!(closed(&mesh).is_err(), "one triangle the wrong way round");
+        assert!(closed(&Mesh::default()).is_err());
     }
 
     #[test]

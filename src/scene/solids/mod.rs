@@ -18,6 +18,7 @@ use std::sync::Arc;
 use glam::DAffine3;
 
 use super::description::{MaterialId, Shape};
+use super::mesh::Mesh;
 pub use place::{
     Placed, ball, cone, cylinder, ellipsoid, elliptic_hyperboloid, elliptic_paraboloid, half_space,
     hyperbolic_cylinder, hyperboloid, parabolic_cylinder, torus, truncated_cone,
@@ -103,6 +104,8 @@ pub enum Solid {
         /// g0, g1, g2.
         profile: [f64; 3],
     },
+    /// The inside of a closed triangle mesh whose triangles wind counter-clockwise seen from outside.
+    Mesh(Arc<Mesh>),
 }
 
 impl SolidTree {

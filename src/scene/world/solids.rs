@@ -3,9 +3,10 @@
 use glam::DVec3;
 
 use crate::bvh::Preset;
-use crate::csg::{self, Built, Form, Input, LeafInput, Op, Token};
+use crate::csg::{self, Built, Form, Input, LeafInput, Op, Token, Triangles};
 use crate::lanes::Real;
 use crate::scene::description::Shape;
+use crate::scene::mesh::Mesh;
 use crate::scene::solids::Solid;
 use crate::scene::solids::flat::{FlatTree, Operator, Step};
 use crate::shape::{self, Cone, Cuboid, Cylinder, Disc, HalfSpace, Solid as _, Sphere};
@@ -35,8 +36,9 @@ fn planes_of(solid: &Solid) -> Vec<(DVec3, f64)> {
     }
 }
 
-fn form<'a>(solid: &Solid, planes: &'a [(DVec3, f64)]) -> Form<'a> {
+fn form<'a>(solid: &'a Solid, planes: &'a [(DVec3, f64)]) -> Form<'a> {
     match *solid {
+        Solid::Mesh(ref mesh) => Form::Mesh(&**mesh),
         Solid::Shape(Shape::HalfSpace) => Form::HalfSpace,
         Solid::Shape(Shape::Cuboid) => Form::Cuboid,
         Solid::Shape(Shape::Cylinder) => Form::Cylinder,
@@ -48,6 +50,16 @@ fn form<'a>(solid: &Solid, planes: &'a [(DVec3, f64)]) -> Form<'a> {
         Solid::Taper { x, y } => Form::Taper([x, y]),
         Solid::Round { profile } => Form::Round(profile),
         Solid::Trough { profile } => Form::Trough(profile),
+    }
+}
+
+impl Triangles for Mesh {
+    fn count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    fn corners(&self, i: usize) -> [DVec3; 3] {
+        Self::corners(self, i)
     }
 }
 
@@ -90,5 +102,10 @@ pub fn solid_normal(solid: &Solid, point: DVec3, face: u32) -> DVec3 {
         Solid::Taper { x, y } => shape::taper_normal(point, face, [*x, *y]),
         Solid::Round { profile } => shape::quadric::round_normal(point, face, *profile),
         Solid::Trough { profile } => shape::quadric::trough_normal(point, face, *profile),
+        Solid::Mesh(mesh) if (face as usize) < mesh.triangles.len() => {
+            let [a, b, c] = mesh.corners(face as usize);
+            (b - a).cross(c - a)
+        }
+        Solid::Mesh(_) => DVec3::ZERO,
     }
 }

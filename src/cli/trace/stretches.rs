@@ -1,0 +1,126 @@
+//! `lanecast trace --query all`: every stretch of the rays inside a solid.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::super::interrupt::stopped;
+use super::super::output::{json_to_stdout, to_stdout};
+use super::{Seconds, TraceArgs};
+use crate::error::{Error, Result};
+use crate::film::npy;
+use crate::lanes::{Real, compiled_isa};
+use crate::measure::raysets::split;
+use crate::measure::stats::summary;
+use crate::measure::timing::Workers;
+use crate::ray::Rays;
+use crate::scene::description::Description;
+use crate::scene::world::World;
+use crate::trace::{Engines, Scratch, Stretch, stretches};
+
+/// The object of `--json`.
+#[derive(Serialize)]
+struct Report<'a> {
+    scene: &'a str,
+    engine: &'static str,
+    query: &'static str,
+    precision: &'static str,
+    isa: &'static str,
+    threads: usize,
+    rays: u64,
+    stretches: u64,
+    /// Sum of all stretches' lengths in t, of those that end.
+    inside: f64,
+    repeat: u32,
+    seconds: Seconds,
+    build_seconds: f64,
+}
+
+/// Traces, times and writes.
+///
+/// # Errors
+/// Bad input, [`Error::Mismatch`] if rays one by one give other stretches, [`Error::Interrupted`].
+pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f32>) -> Result<()> {
+    let scalar = args.engine.find::<S>()?.lanes() == 1;
+    let workers = Workers::new(args.threads.count())?;
+    let world = workers.install(|| World::<S>::compile(description, args.scene.options.preset()))?;
+    let batches = split::<S>(rays);
+    let pass = |scalar: bool| workers.install(|| all(&world, &batches, scalar));
+    let found = pass(scalar);
+    if !scalar && pass(true) != found {
+        return Err(Error::Mismatch("the stretches of packets differ from those of rays one by one".into()));
+    }
+    let mut seconds = Vec::new();
+    for _ in 0..args.repeat {
+        if stopped() {
+            return Err(Error::Interrupted);
+        }
+        let start = Instant::now();
+        std::hint::black_box(pass(scalar));
+        seconds.push(start.elapsed().as_secs_f64());
+    }
+    if let Some(path) = &args.hits {
+        npy::write_stretches(path, &found)?;
+    }
+    let seconds = summary(&seconds).ok_or_else(|| Error::Usage("--repeat 0: nothing to report".into()))?;
+    let report = Report {
+        scene: &args.scene.scene,
+        engine: if scalar { "scalar" } else { "packet8" },
+        query: "all",
+        precision: S::PRECISION,
+        isa: compiled_isa(),
+        threads: workers.threads(),
+        rays: rays.len() as u64,
+        stretches: found.len() as u64,
+        inside: found.iter().map(|s| s.t_out - s.t_in).filter(|length| length.is_finite()).sum(),
+        repeat: args.repeat,
+        build_seconds: world.stats().build_seconds,
+        seconds: Seconds { min: seconds.min, median: seconds.median, max: seconds.max },
+    };
+    if args.output.json { json_to_stdout(&report) } else { to_stdout(&text(&report)) }
+}
+
+/// The stretches of all batches, rays numbered through them.
+fn all<S: Engines>(world: &World<S>, batches: &[Rays<S>], scalar: bool) -> Vec<Stretch> {
+    let mut firsts = Vec::with_capacity(batches.len());
+    let mut count = 0;
+    for batch in batches {
+        firsts.push(count);
+        count += batch.len() as u32;
+    }
+    let lists: Vec<Vec<Stretch>> = batches
+        .par_iter()
+        .zip(&firsts)
+        .map_init(Scratch::default, |scratch, (rays, first)| {
+            let mut list = match scalar {
+                true => stretches::<S>(world, rays, scratch),
+                false => stretches::<<S as Real>::Octo>(world, rays, scratch),
+            };
+            list.iter_mut().for_each(|s| s.ray += first);
+            list
+        })
+        .collect();
+    lists.concat()
+}
+
+fn text(report: &Report<'_>) -> String {
+    let rate = report.rays as f64 / report.seconds.median.max(f64::MIN_POSITIVE) / 1e6;
+    format!(
+        "{} {} all {} ({}), {} threads\n\
+         rays      {}\n\
+         stretches {}, length {:.6e}\n\
+         speed     {rate:.3} Mrays/s median of {}\n\
+         build     {:.3} s\n",
+        report.scene,
+        report.engine,
+        report.precision,
+        report.isa,
+        report.threads,
+        report.rays,
+        report.stretches,
+        report.inside,
+        report.repeat,
+        report.build_seconds,
+    )
+}

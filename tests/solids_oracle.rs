@@ -1,0 +1,106 @@
+//! Random trees of solids: all engines give the same bits, and the oracle explains every answer.
+
+mod common;
+mod solid_support;
+
+use common::Random;
+use glam::DVec3;
+use lanecast::lanes::Real;
+use lanecast::ray::{Hits, Rays};
+use lanecast::reference::{EngineHit, Oracle, OracleRay, Tally};
+use lanecast::scene::description::{Description, Precision};
+use lanecast::scene::solids::SolidTree;
+use lanecast::scene::world::{Preset, World};
+use lanecast::trace::{Engines, Scratch};
+use rayon::prelude::*;
+use solid_support::{KINDS, grow, rays, scene};
+
+fn oracle_ray<S: Real>(rays: &Rays<S>, i: usize) -> OracleRay {
+    let v = |p: [S; 3]| DVec3::from_array(p.map(Real::to_f64));
+    OracleRay { org: v(rays.org(i)), dir: v(rays.dir(i)), t_min: rays.t_min[i].to_f64(), t_max: rays.t_max[i].to_f64() }
+}
+
+/// Bits over all engines, then the verdicts on them.
+fn judged<S: Engines>(description: &Description, n: usize, seed: u64, precision: Precision) -> Tally {
+    let world = World::<S>::compile(description, Preset::Fast).unwrap();
+    let oracle = Oracle::new(&world.assembly);
+    let rays = rays::<S>(n, seed);
+    let mut scratch = Scratch::default();
+    let (mut want, mut got) = (Hits::<S>::default(), Hits::<S>::default());
+    let (mut any_want, mut any) = (Vec::new(), Vec::new());
+    for (e, engine) in S::engines().iter().enumerate() {
+        engine.intersect(&world, &rays, &mut got, &mut scratch, None);
+        engine.occluded(&world, &rays, &mut any, &mut scratch, None);
+        if e == 0 {
+            (want, any_want) = (got.clone(), any.clone());
+            for i in 0..n {
+                assert_eq!(any[i] == 1, got.is_hit(i), "seed {seed} ray {i}: any-hit and closest-hit differ");
+            }
+        }
+        for i in 0..n {
+            let bits = |h: &Hits<S>| ([h.t[i], h.u[i], h.v[i]].map(|x| x.to_f64().to_bits()), h.prim[i], h.inst[i]);
+            assert_eq!(bits(&got), bits(&want), "seed {seed}, {}, ray {i}: {:?}", engine.name(), oracle_ray(&rays, i));
+        }
+        assert_eq!(any, any_want, "seed {seed}, {}", engine.name());
+    }
+    let mut tally = Tally::default();
+    for i in 0..n {
+        let answer = want.is_hit(i).then(|| EngineHit {
+            t: want.t[i].to_f64(),
+            u: want.u[i].to_f64(),
+            v: want.v[i].to_f64(),
+            prim: want.prim[i],
+            inst: want.inst[i],
+        });
+        tally.add(answer.is_some(), &oracle.judge(&oracle_ray(&rays, i), answer, precision));
+    }
+    tally
+}
+
+fn all<S: Engines>(precision: Precision, kinds: usize, seeds: std::ops::Range<u64>, n: usize) {
+    let tallies: Vec<(u64, Tally)> = seeds
+        .into_par_iter()
+        .map(|seed| {
+            let mut r = Random(seed);
+            let mut tree = SolidTree::new("random");
+            let root = grow(&mut tree, &mut r, 1 + (seed % 8) as usize, kinds);
+            tree.root = root;
+            (seed, judged::<S>(&scene(tree), n, seed, precision))
+        })
+        .collect();
+    let mut sum = Tally::default();
+    for (seed, tally) in &tallies {
+        if !tally.is_clean() {
+            println!("seed {seed}: {tally}");
+        }
+        sum.merge(tally);
+    }
+    println!("{precision:?}, {kinds} kinds: {sum}");
+    assert!(sum.hits > sum.rays / 8, "only {} of {} rays hit", sum.hits, sum.rays);
+    assert!(sum.is_clean(), "{} unexplained", sum.unexplained);
+}
+
+/// Trees per test and rays per tree.
+fn size() -> (u64, usize) {
+    if std::env::var_os("LANECAST_LONG_TESTS").is_some() { (2000, 5000) } else { (64, 500) }
+}
+
+#[test]
+fn convex_solids_f64() {
+    all::<f64>(Precision::F64, 8, 0..size().0, size().1);
+}
+
+#[test]
+fn convex_solids_f32() {
+    all::<f32>(Precision::F32, 8, 0..size().0, size().1);
+}
+
+#[test]
+fn all_solids_f64() {
+    all::<f64>(Precision::F64, KINDS, 10_000..10_000 + size().0, size().1);
+}
+
+#[test]
+fn all_solids_f32() {
+    all::<f32>(Precision::F32, KINDS, 20_000..20_000 + size().0, size().1);
+}
