@@ -9,6 +9,7 @@ mod explain;
 mod info;
 mod interrupt;
 mod isa;
+mod picture;
 mod rays;
 mod render;
 mod report;

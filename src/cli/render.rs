@@ -1,6 +1,6 @@
 //! `lanecast render`: a picture of a scene.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::ProgressBar;
@@ -8,9 +8,10 @@ use serde::Serialize;
 
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
 use super::output::json_to_stdout;
+use super::picture::{Format, Target, target, write};
 use crate::error::{Error, Result};
-use crate::film::exr::{Compression, ImageInfo};
-use crate::film::{Film, Window, exr, npy, pix, png};
+use crate::film::Window;
+use crate::film::exr::ImageInfo;
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
 use crate::render::{Aov, Progress, RenderOptions, RenderOutput, render};
@@ -89,22 +90,6 @@ pub struct RenderArgs {
     threads: ThreadArgs,
     #[command(flatten)]
     pub(super) output: OutputArgs,
-}
-
-/// Output formats.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
-    Exr,
-    Png,
-    Npy,
-    Pix,
-}
-
-/// A file to write and its format.
-#[derive(Clone, Debug)]
-struct Target {
-    path: PathBuf,
-    format: Format,
 }
 
 /// The object of `--json`.
@@ -346,44 +331,6 @@ fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput) -> Result
     if args.output.json { json_to_stdout(report) } else { Ok(()) }
 }
 
-fn write(target: &Target, film: &Film, info: &ImageInfo, exposure: f32) -> Result<()> {
-    match target.format {
-        Format::Exr => exr::write(&target.path, film, info, Compression::default()),
-        Format::Png => png::write(&target.path, film, exposure),
-        Format::Npy => write_npy(&target.path, film),
-        Format::Pix => pix::write(&target.path, film, exposure),
-    }
-}
-
-/// R, G, B and A as one array, every other plane as one of its own.
-fn write_npy(path: &Path, film: &Film) -> Result<()> {
-    let (width, height) = (film.window.width(), film.window.height());
-    let colors: Vec<&[f32]> = ["R", "G", "B", "A"].iter().filter_map(|name| film.f32_plane(name)).collect();
-    npy::write_stack(path, width, height, &colors)?;
-    film.planes
-        .iter()
-        .skip(colors.len())
-        .try_for_each(|plane| npy::write_plane(&plane_path(path, &plane.name), width, height, &plane.data))
-}
-
-/// `out.npy` and plane `id.instance` give `out.id.instance.npy`.
-fn plane_path(path: &Path, plane: &str) -> PathBuf {
-    path.with_extension(format!("{plane}.npy"))
-}
-
-fn target(text: &str) -> std::result::Result<Target, String> {
-    let path = PathBuf::from(text);
-    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-    let format = match extension.as_deref() {
-        Some("exr") => Format::Exr,
-        Some("png") => Format::Png,
-        Some("npy") => Format::Npy,
-        Some("pix") => Format::Pix,
-        _ => return Err("expected a file name that ends in .exr, .png, .npy or .pix".into()),
-    };
-    Ok(Target { path, format })
-}
-
 fn crop(text: &str) -> std::result::Result<Window, String> {
     let numbers: Option<Vec<u32>> = text.split(',').map(|s| s.trim().parse().ok()).collect();
     match numbers.as_deref() {
@@ -397,13 +344,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn targets_and_crops_parse_or_say_what_is_expected() {
-        assert_eq!(target("a/b.EXR").unwrap().format, Format::Exr);
-        assert!(target("a.jpg").is_err() && target("png").is_err());
+    fn crops_parse_or_say_what_is_expected() {
         assert_eq!(crop("1,2,3,4"), Ok(Window { x0: 1, y0: 2, x1: 3, y1: 4 }));
         for wrong in ["1,2,1,4", "1,2,3", "-1,2,3,4", "a,b,c,d", "1,2,3,4,5"] {
             assert!(crop(wrong).is_err(), "{wrong}");
         }
-        assert_eq!(plane_path(Path::new("d/out.npy"), "N.X"), Path::new("d/out.N.X.npy"));
     }
 }

@@ -197,7 +197,7 @@ impl<'a, S: Real> Shader<'a, S> {
     /// The same with the lighting model of [`Integrator::Rt`], seen by `camera`: of use for BRL-CAD databases only.
     #[must_use]
     pub fn with_rt(mut self, description: &Description, camera: &Camera) -> Self {
-        self.rt = description.looks.as_ref().map(|looks| Rt::new(looks, description, camera));
+        self.rt = description.looks.as_ref().map(|looks| Rt::new(looks, camera));
         self
     }
 

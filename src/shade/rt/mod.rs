@@ -23,7 +23,6 @@ use crate::camera::Camera;
 use crate::lanes::Real;
 use crate::ray::Rays;
 use crate::scene::brlcad::describe::Looks;
-use crate::scene::description::Description;
 use lamp::Lamp;
 use material::RtMaterial;
 pub use material::unknown_shaders;
@@ -49,8 +48,8 @@ pub(super) struct Rt {
     materials: Vec<RtMaterial>,
     lamps: Vec<Lamp>,
     surroundings: Option<Pattern>,
-    /// Whether a ray may start inside a solid that it never leaves.
-    unbounded: bool,
+    /// Whether each region has no bounds: a ray may start inside and never leave it.
+    unbounded: Vec<bool>,
 }
 
 /// A ray on its way, with what of its colour reaches the pixel.
@@ -105,17 +104,12 @@ enum Found {
 }
 
 impl Rt {
-    /// The looks of `description`, lit by its own lights, or by one over the viewer's left shoulder.
-    pub fn new(looks: &Looks, description: &Description, camera: &Camera) -> Self {
+    /// Regions that look like `looks`, lit by their own lights, or by one over the viewer's left shoulder.
+    pub fn new(looks: &Looks, camera: &Camera) -> Self {
         let materials: Vec<RtMaterial> = looks.regions.iter().map(RtMaterial::of).collect();
         let surroundings = looks.surroundings.as_ref().and_then(|shader| Pattern::of(shader.layers.first()?));
-        let unbounded = looks.regions.iter().any(|look| look.bounds.is_none());
-        Self {
-            lamps: lamp::lamps(looks, &materials, camera),
-            materials,
-            surroundings,
-            unbounded: unbounded && !description.solids.is_empty(),
-        }
+        let unbounded = looks.regions.iter().map(|look| look.bounds.is_none()).collect();
+        Self { lamps: lamp::lamps(looks, &materials, camera), materials, surroundings, unbounded }
     }
 }
 
@@ -177,7 +171,7 @@ impl<S: Real> Shader<'_, S> {
 
     /// Rays that nothing stops: the surroundings, or the inside of a solid without end.
     fn rt_lost(&self, rt: &Rt, lost: &[Path], work: &mut Workspace<S>, out: &mut [Sample]) {
-        let inside = if rt.unbounded { self.rt_inside(lost, work) } else { vec![false; lost.len()] };
+        let inside = self.rt_inside(rt, lost, work);
         for (path, inside) in lost.iter().zip(inside) {
             let color = match &rt.surroundings {
                 _ if inside => DVec3::splat(INSIDE.0),
@@ -190,11 +184,15 @@ impl<S: Real> Shader<'_, S> {
         }
     }
 
-    /// Whether each ray starts inside a region: one that looks back leaves it.
-    fn rt_inside(&self, paths: &[Path], work: &mut Workspace<S>) -> Vec<bool> {
+    /// Whether each ray starts inside a region without bounds: one that looks back leaves it.
+    fn rt_inside(&self, rt: &Rt, paths: &[Path], work: &mut Workspace<S>) -> Vec<bool> {
+        if !rt.unbounded.contains(&true) {
+            return vec![false; paths.len()];
+        }
         let back: Vec<Path> = paths.iter().map(|path| Path { dir: -path.dir, ..*path }).collect();
-        let found = self.rt_trace(&back, work);
-        found.iter().map(|found| matches!(found, Found::Leaving { .. })).collect()
+        let is_inside =
+            |found: &Found| matches!(found, Found::Leaving { region, .. } if rt.unbounded[*region as usize]);
+        self.rt_trace(&back, work).iter().map(is_inside).collect()
     }
 
     /// The first surface on each path.

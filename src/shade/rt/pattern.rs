@@ -150,7 +150,7 @@ pub(super) fn uv_of_arb(points: &[DVec3; 8], position: DVec3, normal: DVec3) -> 
     let distance = |face: &Face| (position - face.origin).dot(face.normal).abs();
     let best = faces.filter(|face| along(face) > 0.999).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     let from = position - best.origin;
-    Some([from.dot(best.u) / best.u_length, 1.0 - from.dot(best.v) / best.v_length])
+    Some([from.dot(best.u) / best.u_length, from.dot(best.v) / best.v_length])
 }
 
 /// A face of an arb with its axes.

@@ -1,0 +1,79 @@
+//! Pictures as files: the extension chooses the format.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::Result;
+use crate::film::exr::{Compression, ImageInfo};
+use crate::film::{Film, exr, npy, pix, png};
+
+/// Output formats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    Exr,
+    Png,
+    Npy,
+    Pix,
+}
+
+/// A file to write and its format.
+#[derive(Clone, Debug)]
+pub(super) struct Target {
+    pub path: PathBuf,
+    pub format: Format,
+}
+
+/// Writes `film` in the target's format; `exposure` is for those of 8 bits.
+///
+/// # Errors
+/// Those of the format's writer.
+pub(super) fn write(target: &Target, film: &Film, info: &ImageInfo, exposure: f32) -> Result<()> {
+    match target.format {
+        Format::Exr => exr::write(&target.path, film, info, Compression::default()),
+        Format::Png => png::write(&target.path, film, exposure),
+        Format::Npy => write_npy(&target.path, film),
+        Format::Pix => pix::write(&target.path, film, exposure),
+    }
+}
+
+/// R, G, B and A as one array, every other plane as one of its own.
+fn write_npy(path: &Path, film: &Film) -> Result<()> {
+    let (width, height) = (film.window.width(), film.window.height());
+    let colors: Vec<&[f32]> = ["R", "G", "B", "A"].iter().filter_map(|name| film.f32_plane(name)).collect();
+    npy::write_stack(path, width, height, &colors)?;
+    film.planes
+        .iter()
+        .skip(colors.len())
+        .try_for_each(|plane| npy::write_plane(&plane_path(path, &plane.name), width, height, &plane.data))
+}
+
+/// `out.npy` and plane `id.instance` give `out.id.instance.npy`.
+fn plane_path(path: &Path, plane: &str) -> PathBuf {
+    path.with_extension(format!("{plane}.npy"))
+}
+
+/// The format that a file's extension names.
+pub(super) fn target(text: &str) -> std::result::Result<Target, String> {
+    let path = PathBuf::from(text);
+    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    let format = match extension.as_deref() {
+        Some("exr") => Format::Exr,
+        Some("png") => Format::Png,
+        Some("npy") => Format::Npy,
+        Some("pix") => Format::Pix,
+        _ => return Err("expected a file name that ends in .exr, .png, .npy or .pix".into()),
+    };
+    Ok(Target { path, format })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn targets_parse_or_say_what_is_expected() {
+        assert_eq!(target("a/b.EXR").unwrap().format, Format::Exr);
+        assert_eq!(target("a.pix").unwrap().format, Format::Pix);
+        assert!(target("a.jpg").is_err() && target("png").is_err());
+        assert_eq!(plane_path(Path::new("d/out.npy"), "N.X"), Path::new("d/out.N.X.npy"));
+    }
+}
