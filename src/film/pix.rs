@@ -62,7 +62,7 @@ pub fn parse(file: &Path, bytes: &[u8], size: Option<(u32, u32)>) -> Result<Film
     let pixels = bytes.len() as u64 / CHANNELS as u64;
     let side = pixels.isqrt();
     let (width, height) = size.unwrap_or((side as u32, side as u32));
-    let expected = u64::from(width) * u64::from(height) * CHANNELS as u64;
+    let expected = (u64::from(width) * u64::from(height)).saturating_mul(CHANNELS as u64);
     if bytes.is_empty() || bytes.len() as u64 != expected {
         let length = bytes.len();
         let error = match size {
