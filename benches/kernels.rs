@@ -79,7 +79,7 @@ impl Kernel for Triangles {
 
     #[inline(always)]
     fn test<V: Lanes>(data: &Self::Data<V::Scalar>, packet: &Packet<V>, hit: &mut HitPacket<V>) {
-        Triangle::intersect(packet, data, (1 << BLOCK) - 1, V::ALL, |found, lanes, prim| {
+        Triangle::intersect(packet, hit.t, data, (1 << BLOCK) - 1, V::ALL, |found, lanes, prim| {
             hit.commit(lanes, found, prim, 0)
         });
     }

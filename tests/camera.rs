@@ -61,7 +61,7 @@ fn parallel_rays_start_apart_and_run_together() {
 #[test]
 fn tiles_hold_the_formulas_rays_whatever_the_tile_size() {
     let camera = simple(17.0 / 31.0);
-    for sub_pixel in [SubPixel::Centre, SubPixel::Sample { sample: 3, seed: 9 }] {
+    for sub_pixel in [SubPixel::Anchor, SubPixel::Sample { sample: 3, seed: 9 }] {
         let mut first: Vec<Option<[u64; 6]>> = vec![None; 17 * 31];
         for edge in [8, 16, 32] {
             let tiling = Tiling::new(17, 31, edge).unwrap();
@@ -82,7 +82,7 @@ fn tiles_hold_the_formulas_rays_whatever_the_tile_size() {
                         camera.ray(17, 31, (x + 1).into(), (y + 1).into()).1,
                     );
                     assert!(d[0] >= ulo.x && d[0] < uhi.x && d[1] <= ulo.y && d[1] > uhi.y && d[2] == -1.0);
-                    if sub_pixel == SubPixel::Centre {
+                    if sub_pixel == SubPixel::Anchor {
                         close(DVec3::from(d), camera.ray(17, 31, f64::from(x) + 0.5, f64::from(y) + 0.5).1);
                     }
                 }
@@ -98,8 +98,8 @@ fn f32_rays_are_the_f64_rays_rounded_and_crops_are_dead_outside() {
     let tiling = Tiling::new(64, 64, 32).unwrap();
     let rect = PixelRect { x0: 3, y0: 5, x1: 20, y1: 31 };
     let (mut single, mut double) = (Rays::<f32>::default(), Rays::<f64>::default());
-    fill_tile(&camera, &tiling, 0, ALL, SubPixel::Centre, &mut double);
-    fill_tile(&camera, &tiling, 0, rect, SubPixel::Centre, &mut single);
+    fill_tile(&camera, &tiling, 0, ALL, SubPixel::Anchor, &mut double);
+    fill_tile(&camera, &tiling, 0, rect, SubPixel::Anchor, &mut single);
     assert_eq!(single.live_count(), 17 * 26);
     for i in 0..single.len() {
         let (x, y) = tiling.pixel(i as u64).unwrap();

@@ -65,3 +65,34 @@ fn gltf_corpus() {
     const NO_FILES: References = References { folder: None, allow_outside: false };
     replay("gltf", |file, bytes| gltf::parse(file, "corpus", bytes, &NO_FILES).map(|scene| scene.meshes));
 }
+
+/// Files of a corpus by whether they were accepted: each file is read by `parse`.
+fn verdicts(folder: &str, parse: impl Fn(&Path, &[u8]) -> bool) -> Vec<(String, bool)> {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(folder);
+    let Ok(entries) = std::fs::read_dir(&corpus) else {
+        println!("SKIPPED: no fuzz corpus for {folder} (packaged sources leave it out)");
+        return Vec::new();
+    };
+    let paths = entries.map(|entry| entry.unwrap().path());
+    let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+    paths.map(|path| (name(&path), parse(&path, &std::fs::read(&path).unwrap()))).collect()
+}
+
+#[test]
+fn pfm_corpus() {
+    let parse = |file: &Path, bytes: &[u8]| {
+        let film = lanecast::film::pfm::parse(file, bytes);
+        film.is_ok_and(|film| film.validate().is_ok())
+    };
+    for (name, accepted) in verdicts("pfm", parse).into_iter().filter(|(name, _)| name.contains('.')) {
+        assert_eq!(accepted, name != "lie.pfm", "{name}");
+    }
+}
+
+#[test]
+fn experiment_corpus() {
+    let parse = |file: &Path, bytes: &[u8]| lanecast::measure::experiment::parse(file, bytes).is_ok();
+    for (name, accepted) in verdicts("experiment", parse).into_iter().filter(|(name, _)| name.contains('.')) {
+        assert_eq!(accepted, name != "misspelt.kdl", "{name}");
+    }
+}

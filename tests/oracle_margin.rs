@@ -86,6 +86,7 @@ impl StandIn {
                 PartKind::Mesh(mesh) => (0..mesh.triangles.len())
                     .map(|i| Prim::Triangle(mesh.corners(i).map(|p| part.to_object.transform_point3(p).as_vec3())))
                     .collect(),
+                PartKind::Solids(_) => unreachable!("the stand-in is given meshes and shapes"),
             });
             prims.collect()
         });

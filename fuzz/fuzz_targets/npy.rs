@@ -14,6 +14,9 @@ fuzz_target!(|bytes: &[u8]| {
         npy::parse_occlusion(file, bytes).map(|flags| flags.len()),
         npy::parse_plane(file, bytes).map(|(_, _, data)| 4 * data.len()),
     ];
+    if let Ok(film) = npy::parse_film(file, bytes) {
+        film.validate().expect("a film that was read keeps its invariants");
+    }
     // Whatever is accepted was in the file.
     assert!(sizes.into_iter().flatten().all(|size| size <= bytes.len()));
 });

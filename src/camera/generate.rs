@@ -17,8 +17,8 @@ const LARGEST_BATCH: usize = (FILE_TILE * FILE_TILE) as usize;
 /// Where in its pixel a ray goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SubPixel {
-    /// Through the centre.
-    Centre,
+    /// Where the camera says: [`Camera::anchor`], the centre of most.
+    Anchor,
     /// Through point `sample` of the pixel's own evenly spread sequence (see [`PixelRandom::spread`]).
     Sample {
         /// Number of the sample.
@@ -30,9 +30,9 @@ pub enum SubPixel {
 
 impl SubPixel {
     #[inline]
-    fn offset(self, x: u32, y: u32) -> [f64; 2] {
+    fn offset(self, anchor: [f64; 2], x: u32, y: u32) -> [f64; 2] {
         match self {
-            Self::Centre => [0.5; 2],
+            Self::Anchor => anchor,
             Self::Sample { sample, seed } => PixelRandom::new(x, y, seed).spread(sample, DIMENSION),
         }
     }
@@ -56,7 +56,7 @@ pub fn fill_tile<S: Real>(
     let (columns, rows) = (f64::from(tiling.width()), f64::from(tiling.height()));
     for i in 0..count {
         let (dx, dy) = morton_decode(i as u32);
-        let [sx, sy] = sub_pixel.offset(x0 + dx, y0 + dy);
+        let [sx, sy] = sub_pixel.offset(camera.anchor, x0 + dx, y0 + dy);
         let c = f64::from(x0 + dx) + sx;
         let r = rows - (f64::from(y0 + dy) + sy);
         a[i] = camera.half_width * (2.0 * c / columns - 1.0);

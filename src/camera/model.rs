@@ -14,6 +14,7 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::scene::brlcad::view::View;
 use crate::scene::description::{CameraDescription, Projection};
 
 /// A camera ready to make rays. All vectors are f64, world space; u, v, n are orthonormal, u points right, v up and
@@ -34,7 +35,14 @@ pub struct Camera {
     pub half_height: f64,
     /// Whether all rays have direction -n (and their origins vary) or all start at the eye.
     pub parallel: bool,
+    /// Where in its pixel a single ray goes: x to the right, y down, 0 to 1. The centre, or BRL-CAD's lower left corner.
+    pub anchor: [f64; 2],
 }
+
+/// The centre of a pixel.
+const CENTRE: [f64; 2] = [0.5, 0.5];
+/// The corner of a pixel where BRL-CAD's `rt` samples.
+const LOWER_LEFT: [f64; 2] = [0.0, 1.0];
 
 impl Camera {
     /// The camera that `description` means, for pictures of `aspect` = width / height.
@@ -67,7 +75,22 @@ impl Camera {
             Projection::Parallel { height } if height > 0.0 && height.is_finite() => (height * 0.5, true),
             Projection::Parallel { .. } => return fail("the height of the view must be a positive number"),
         };
-        Ok(Self { eye, u, v: n.cross(u), n, half_width: half_height * aspect, half_height, parallel })
+        Ok(Self { eye, u, v: n.cross(u), n, half_width: half_height * aspect, half_height, parallel, anchor: CENTRE })
+    }
+
+    /// The camera of BRL-CAD's `rt`: the view's size is the picture's width, rays start on the plane through the eye,
+    /// and pixels are sampled at their lower left corners. Pixels are square, as `rt -V` with the picture's aspect.
+    ///
+    /// # Errors
+    /// A usage error if the aspect ratio is not positive.
+    pub fn of_view(view: &View, aspect: f64) -> Result<Self> {
+        if !(aspect > 0.0 && aspect.is_finite()) {
+            return Err(Error::Usage("the aspect ratio must be a positive number".into()));
+        }
+        let [u, v, n] = view.axes;
+        let half_width = view.perspective.map_or(view.size * 0.5, |angle| (angle * 0.5).tan());
+        let parallel = view.perspective.is_none();
+        Ok(Self { eye: view.eye, u, v, n, half_width, half_height: half_width / aspect, parallel, anchor: LOWER_LEFT })
     }
 
     /// Origin and direction of the ray through the point (x, y) of a picture of `width` x `height` pixels; x to the

@@ -1,5 +1,8 @@
 //! `lanecast bench`: engines x ray classes x scenes, as a table, as rows, as JSON.
 
+mod against;
+mod experiment;
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -12,6 +15,7 @@ use crate::film::write_atomically;
 use crate::measure::bench::{self, Plan};
 use crate::measure::compare;
 use crate::measure::env;
+use crate::measure::history;
 use crate::measure::peers::Invitation;
 use crate::measure::raysets::RayKind;
 use crate::measure::rows::{self, LEGEND, Outcome, Row, Run};
@@ -31,7 +35,10 @@ Examples:
   lanecast bench model.ply --rays primary,ao --engines scalar,packet16 --threads 1
   lanecast bench model.ply --size 1024x576 --eye 0,1,5 --look-at 0,1,0 -o results
   lanecast bench model.ply --peers obvhs,embree --embree libembree4.so.4 --threads 1
+  lanecast bench model.ply --against ../old/lanecast --turns 8 --engines scalar,tile
   lanecast bench --compare results/before results/after
+  lanecast bench --experiment scenes/experiments/widths.kdl -o out/widths
+  lanecast bench model.ply --record results
 
 Before the clock starts, every engine's hits are compared bit for bit with the scalar engine's (those of tile,
 which has an arithmetic of its own, up to rounding, and the f64 oracle must explain the others), and a sample of
@@ -71,9 +78,29 @@ pub struct BenchArgs {
     /// Seed of the random directions
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Show what moved between two runs: folders that -o wrote, or their bench.csv files; nothing is measured
+    /// Show what moved between two runs: folders that -o wrote, their bench.csv files, or folders of such folders (turns);
+    /// nothing is measured
     #[arg(long, value_names = ["OLD", "NEW"], num_args = 2, conflicts_with_all = ["scenes", "engines", "peers", "folder"])]
     compare: Vec<PathBuf>,
+    /// Measure what a file asks for (docs/EXPERIMENTS.md; scenes/experiments has some); the same command goes on where it was
+    #[arg(
+        long,
+        value_name = "FILE.kdl",
+        conflicts_with_all = ["scenes", "engines", "peers", "compare", "against", "record"]
+    )]
+    experiment: Option<PathBuf>,
+    /// Take turns with another lanecast (old, new, old, new, ...) and show what moved: the surest comparison
+    #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["compare", "record"])]
+    against: Option<PathBuf>,
+    /// Turns of each program with --against
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=1000))]
+    turns: u32,
+    /// Keep the rows for good, in DIR/CPU/DATE-REVISION/SCENE; refused for a build whose sources no revision names
+    #[arg(long, value_name = "DIR", conflicts_with = "compare")]
+    record: Option<PathBuf>,
+    /// Let --record keep rows of such a build; they are marked
+    #[arg(long, requires = "record")]
+    dirty: bool,
     /// Folder for bench.csv (one row per figure), bench.env.txt (machine and build) and a picture of each scene
     /// (NAME.exr: colours, depth, normals, ids, node visits)
     #[arg(short = 'o', long = "output", value_name = "DIR")]
@@ -104,6 +131,18 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         let changes = compare::compare(&compare::read(old)?, &compare::read(new)?);
         return if args.output.json { json_to_stdout(&changes) } else { to_stdout(&compare::table(&changes)) };
     }
+    if let Some(file) = &args.experiment {
+        experiment::run(file, args.folder.as_deref(), args.embree.as_deref(), &args.output)?;
+        return Ok(());
+    }
+    if let Some(other) = &args.against {
+        let (_dropped_at_the_end, temporary) = against::temporary()?;
+        let changes = against::run(other, args.turns, args.folder.as_ref().unwrap_or(&temporary), &args.output)?;
+        return if args.output.json { json_to_stdout(&changes) } else { to_stdout(&compare::table(&changes)) };
+    }
+    if args.record.is_some() {
+        history::check_revision(env::REVISION, args.dirty)?;
+    }
     args.invitation().check()?;
     // Peers ask for it, and then our engines get it too.
     let workers = Workers::new(args.threads.count())?.flushing(!args.peers.is_empty());
@@ -119,6 +158,13 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     if let (Some(dir), false) = (&args.folder, rows.is_empty()) {
         write(dir, &run, &rows, &facts)?;
         args.output.say(&format!("rows: {}", dir.join("bench.csv").display()));
+    }
+    if let Some(root) = &args.record {
+        for rows in rows.chunk_by(|a, b| a.scene.hash == b.scene.hash) {
+            let dir = history::folder(root, &run, &rows[0].scene.name)?;
+            write(&dir, &run, rows, &facts)?;
+            args.output.say(&format!("rows: {}", dir.join("bench.csv").display()));
+        }
     }
     finished?;
     if let Some(dir) = &args.folder {
@@ -202,8 +248,11 @@ fn one<S: Engines>(
 
 fn write(dir: &Path, run: &Run, rows: &[Row], facts: &str) -> Result<()> {
     std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, e))?;
-    for (name, text) in [("bench.csv", rows::csv(run, rows)), ("bench.env.txt", facts.to_string())] {
-        write_atomically(&dir.join(name), |file| file.write_all(text.as_bytes()))?;
-    }
-    Ok(())
+    // The rows come last: a folder that has them is whole.
+    write_whole(&dir.join("bench.env.txt"), facts.as_bytes())?;
+    write_whole(&dir.join("bench.csv"), rows::csv(run, rows).as_bytes())
+}
+
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_atomically(path, |file| file.write_all(bytes))
 }

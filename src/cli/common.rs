@@ -1,17 +1,16 @@
 //! Arguments that several commands share, and what they mean.
 
-use glam::DVec3;
-
-use crate::camera::{CameraOverrides, framing};
-use crate::error::{Error, Result, nearest_name};
+use crate::error::{Error, Result};
 use crate::measure::timing::MAX_THREADS;
-use crate::scene::description::{CameraDescription, Description, Precision};
+use crate::scene::brlcad::describe::Options;
+use crate::scene::description::{Description, Precision};
 use crate::scene::load::{LoadOptions, load};
 use crate::scene::world::Preset;
 use crate::trace::{EXACT_ENGINE, Engine, Engines, engine as engine_called};
 
 pub use super::interrupt::stop_flag;
 pub use super::output::OutputArgs;
+pub use super::view::{CameraArgs, size};
 
 /// Engine of commands that are not told one.
 const DEFAULT_ENGINE: &str = "auto";
@@ -48,13 +47,10 @@ impl EngineArgs {
     }
 }
 
-/// Largest width or height of a picture.
-const MAX_SIDE: u32 = 1 << 16;
-
 /// A scene and how to open it.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SceneArgs {
-    /// A scene file (.kdl .gltf .glb), a mesh (.obj .ply .stl) or builtin:NAME
+    /// A scene file (.kdl .gltf .glb), a BRL-CAD database (.asc), a mesh (.obj .ply .stl) or builtin:NAME
     pub scene: String,
     #[command(flatten)]
     /// How to open it.
@@ -70,6 +66,12 @@ pub struct SceneOptions {
     /// Let the scene file name other files outside its own folder
     #[arg(long, help_heading = "Scene")]
     pub allow_outside: bool,
+    /// Object of a BRL-CAD database to show; may be given more than once [default: all.g or all, else what no other uses]
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
+    pub top: Vec<String>,
+    /// Show a BRL-CAD database without what is not supported, instead of refusing it
+    #[arg(long, help_heading = "Scene")]
+    pub lenient: bool,
     /// Time the build may take: how good the tree gets
     #[arg(long, value_enum, default_value_t = PresetArg::Balanced, help_heading = "Scene")]
     pub preset: PresetArg,
@@ -114,7 +116,8 @@ impl SceneOptions {
     /// # Errors
     /// Those of [`load`].
     pub fn load(&self, scene: &str) -> Result<Description> {
-        load(scene, &LoadOptions { set: self.set.clone(), allow_outside: self.allow_outside })
+        let brlcad = Options { tops: self.top.clone(), lenient: self.lenient };
+        load(scene, &LoadOptions { set: self.set.clone(), allow_outside: self.allow_outside, brlcad })
     }
 
     /// The precision asked for here, else by the scene, else f32.
@@ -141,80 +144,6 @@ fn setting(text: &str) -> std::result::Result<(String, String), String> {
         Some((name, value)) if !name.is_empty() => Ok((name.into(), value.into())),
         _ => Err("expected NAME=VALUE".into()),
     }
-}
-
-/// Which rays look at the scene.
-#[derive(Clone, Debug, Default, clap::Args)]
-pub struct CameraArgs {
-    /// Picture size in pixels
-    #[arg(long, value_name = "WxH", value_parser = size, help_heading = "Camera")]
-    pub size: Option<(u32, u32)>,
-    /// A camera of the scene file [default: its first; without one, a view that frames the scene]
-    #[arg(long, value_name = "NAME", help_heading = "Camera")]
-    pub camera: Option<String>,
-    /// Eye point
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, help_heading = "Camera")]
-    pub eye: Option<DVec3>,
-    /// Point looked at
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, help_heading = "Camera")]
-    pub look_at: Option<DVec3>,
-    /// Up vector
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, help_heading = "Camera")]
-    pub up: Option<DVec3>,
-    /// Vertical field of view
-    #[arg(long, value_name = "DEGREES", value_parser = field_of_view, help_heading = "Camera")]
-    pub fov: Option<f64>,
-}
-
-impl CameraArgs {
-    /// The camera asked for: the named one, else the scene's first, else one that frames `bounds` (lower and upper
-    /// corner) in a picture of `size`; then `--eye`, `--look-at`, `--up` and `--fov` change it.
-    ///
-    /// # Errors
-    /// A usage error for an unknown name.
-    pub fn choose(
-        &self,
-        description: &Description,
-        bounds: Option<(DVec3, DVec3)>,
-        size: (u32, u32),
-    ) -> Result<CameraDescription> {
-        let camera = match (&self.camera, description.cameras.first()) {
-            (Some(name), _) => named(description, name)?,
-            (None, Some(first)) => first.clone(),
-            (None, None) => framing(bounds, f64::from(size.0) / f64::from(size.1)),
-        };
-        let theta = self.fov.map(f64::to_radians);
-        Ok(CameraOverrides { eye: self.eye, look_at: self.look_at, up: self.up, theta }.apply(&camera))
-    }
-}
-
-fn named(description: &Description, name: &str) -> Result<CameraDescription> {
-    description.cameras.iter().find(|c| c.name == name).cloned().ok_or_else(|| {
-        let names: Vec<&str> = description.cameras.iter().map(|c| c.name.as_str()).collect();
-        let near = nearest_name(name, names.iter().copied()).map(|n| format!(" (did you mean `{n}`?)"));
-        let list = if names.is_empty() { "none".into() } else { names.join(", ") };
-        Error::Usage(format!("no camera `{name}`{}; the scene has: {list}", near.unwrap_or_default()))
-    })
-}
-
-/// Parses `WxH`, 1 to 65536 pixels each way.
-pub fn size(text: &str) -> std::result::Result<(u32, u32), String> {
-    let side = |s: &str| s.parse().ok().filter(|side| (1..=MAX_SIDE).contains(side));
-    let sides = text.split_once('x').and_then(|(w, h)| Some((side(w)?, side(h)?)));
-    sides.ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to {MAX_SIDE}, for example 1280x720"))
-}
-
-fn point(text: &str) -> std::result::Result<DVec3, String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|s| s.trim().parse().ok()).collect();
-    match numbers.as_deref() {
-        Some(&[x, y, z]) if [x, y, z].iter().all(|c: &f64| c.is_finite()) => Ok(DVec3::new(x, y, z)),
-        _ => Err("expected three finite numbers X,Y,Z, for example 0,1.5,-4".into()),
-    }
-}
-
-fn field_of_view(text: &str) -> std::result::Result<f64, String> {
-    let degrees = text.parse().ok().filter(|&d: &f64| d > 0.0 && d < 180.0);
-    degrees.ok_or_else(|| "expected degrees between 0 and 180".into())
 }
 
 /// Threads to use.
@@ -244,52 +173,11 @@ pub fn with_pool<R: Send>(threads: usize, work: impl FnOnce() -> Result<R> + Sen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::description::Projection;
 
     #[test]
     fn arguments_parse_or_say_what_is_expected() {
         assert_eq!(setting("n=3=4"), Ok(("n".into(), "3=4".into())));
         assert!(setting("n").is_err() && setting("=3").is_err());
-        assert_eq!(size("1280x720"), Ok((1280, 720)));
-        for wrong in ["1280", "0x5", "5x", "70000x1", "-1x1", "1x1x1"] {
-            assert!(size(wrong).is_err(), "{wrong}");
-        }
-        assert_eq!(point("0, -1.5,2e3"), Ok(DVec3::new(0.0, -1.5, 2000.0)));
-        for wrong in ["1,2", "1,2,3,4", "a,b,c", "1,2,inf", ""] {
-            assert!(point(wrong).is_err(), "{wrong}");
-        }
-        assert_eq!(field_of_view("45"), Ok(45.0));
-        assert!(field_of_view("180").is_err() && field_of_view("nan").is_err());
-    }
-
-    fn camera(name: &str) -> CameraDescription {
-        let projection = Projection::Parallel { height: 2.0 };
-        CameraDescription { name: name.into(), eye: DVec3::X, look_at: DVec3::ZERO, up: DVec3::Y, projection }
-    }
-
-    #[test]
-    fn cameras_are_found_by_name_and_changed_by_arguments() {
-        let mut scene = Description::new("s");
-        scene.cameras = vec![camera("front"), camera("side")];
-        let size = (4, 3);
-        let choose = |args: &CameraArgs| args.choose(&scene, None, size);
-        assert_eq!(choose(&CameraArgs::default()).unwrap().name, "front");
-        let mut args = CameraArgs { camera: Some("side".into()), ..Default::default() };
-        args.eye = Some(DVec3::Z);
-        args.fov = Some(90.0);
-        let chosen = choose(&args).unwrap();
-        assert_eq!((chosen.name.as_str(), chosen.eye, chosen.up), ("side", DVec3::Z, DVec3::Y));
-        assert_eq!(chosen.projection, Projection::Perspective { theta: std::f64::consts::FRAC_PI_2 });
-        args.camera = Some("sid".into());
-        let text = choose(&args).unwrap_err().to_string();
-        assert!(text.contains("did you mean `side`") && text.contains("front, side"), "{text}");
-    }
-
-    #[test]
-    fn a_scene_without_cameras_is_framed() {
-        let bounds = Some((DVec3::splat(9.0), DVec3::splat(11.0)));
-        let camera = CameraArgs::default().choose(&Description::new("s"), bounds, (4, 3)).unwrap();
-        assert_eq!(camera.look_at, DVec3::splat(10.0));
     }
 
     #[test]

@@ -4,13 +4,17 @@ pub mod common;
 pub mod output;
 
 mod bench;
+mod compare;
+mod explain;
 mod info;
 mod interrupt;
 mod isa;
 mod rays;
 mod render;
+mod report;
 mod trace;
 mod verify;
+mod view;
 
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -31,10 +35,13 @@ Examples:
   lanecast bench                                       how fast, on small built-in scenes
   lanecast bench model.ply --rays primary,shadow       how fast, on a model of yours
   lanecast verify builtin:sphere-flake                 do all engines agree with the f64 oracle
+  lanecast compare a.exr b.exr -o heat.png             how far are two pictures apart, and where
+  lanecast explain model.ply --engine scalar,packet16  why one engine beats another
+  lanecast report out -o report.html                   results as one page to show to others
   lanecast rays model.ply --kind ao -o ao.npy          rays for this and other programs
   lanecast trace model.ply --rays ao.npy --query any   trace a file of rays
 
-A SCENE is a file (.kdl .gltf .glb .obj .ply .stl) or builtin:NAME.
+A SCENE is a file (.kdl .gltf .glb .asc .obj .ply .stl) or builtin:NAME.
 Exit codes: 0 success, 1 a comparison fails, 2 bad usage or input, 130 Ctrl-C.";
 
 /// Traces rays in SIMD lanes: how fast, how right, and what it looks like
@@ -55,6 +62,12 @@ enum Command {
     Trace(trace::TraceArgs),
     /// Write a file of rays of one class
     Rays(rays::RaysArgs),
+    /// Why one engine beats another: distributions of work, cost maps, tree quality
+    Explain(explain::ExplainArgs),
+    /// A folder of results as one page with plots, tables and pictures
+    Report(report::ReportArgs),
+    /// Compare two pictures, or two files of hits: errors, what a person sees, classes, heat maps
+    Compare(compare::CompareArgs),
     /// Compare every engine with the f64 oracle, and bit for bit with each other
     Verify(verify::VerifyArgs),
     /// Counts, bounds, memory, tree quality and warnings of a scene
@@ -91,6 +104,9 @@ fn run(command: &Command) -> Result<()> {
         Command::Bench(args) => &args.output,
         Command::Trace(args) => &args.output,
         Command::Rays(args) => &args.output,
+        Command::Compare(args) => &args.output,
+        Command::Explain(args) => &args.output,
+        Command::Report(args) => &args.output,
         Command::Verify(args) => &args.output,
         Command::Info(args) => &args.output,
     };
@@ -102,6 +118,9 @@ fn run(command: &Command) -> Result<()> {
         Command::Bench(args) => bench::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Rays(args) => rays::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Explain(args) => explain::run(args),
+        Command::Report(args) => report::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Info(args) => info::run(args),
     }

@@ -8,20 +8,22 @@ use serde::Serialize;
 
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
 use super::output::json_to_stdout;
-use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::film::exr::{Compression, ImageInfo};
-use crate::film::{Film, Window, exr, npy, png};
+use crate::film::{Film, Window, exr, npy, pix, png};
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
 use crate::render::{Aov, Progress, RenderOptions, RenderOutput, render};
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
-use crate::shade::Integrator;
+use crate::shade::{Integrator, unknown_shaders};
 use crate::trace::Engines;
 
 /// Picture size unless `--size` says otherwise.
 const DEFAULT_SIZE: (u32, u32) = (960, 540);
+
+/// The same with `--rt-compat`.
+const RT_SIZE: (u32, u32) = (512, 512);
 
 const EXAMPLES: &str = "\
 Examples:
@@ -30,9 +32,12 @@ Examples:
   lanecast render model.ply -o ao.png --integrator ao --ao-samples 64 --exposure 0.5
   lanecast render scene.kdl -o cut.exr --size 1920x1080 --crop 100,100,400,300 --camera side
   lanecast render model.obj -o near.png --eye 0,1,5 --look-at 0,1,0 --fov 35
+  lanecast render moss.asc --top all.g --view moss.rt --rt-compat --size 512x512 -o moss.pix
+  lanecast render m35.asc --az 90 --el 0 --lenient -o front.png
 
 The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as
-float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy). Ctrl-C writes the finished tiles and exits with 130.";
+float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy), .pix (BRL-CAD's: linear, 8 bits,
+no header). Ctrl-C writes the finished tiles and exits with 130.";
 
 /// Arguments of `lanecast render`.
 #[derive(Debug, clap::Args)]
@@ -40,7 +45,7 @@ float, shape (height, width, 4); each further plane in a file beside it, NAME.PL
 pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// File to write: .exr, .png or .npy
+    /// File to write: .exr, .png, .npy or .pix
     #[arg(short = 'o', long = "output", value_name = "FILE", value_parser = target)]
     file: Target,
     #[command(flatten)]
@@ -48,9 +53,12 @@ pub struct RenderArgs {
     /// Part of the picture to render, pixels, y down, half open
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = crop, help_heading = "Camera")]
     crop: Option<Window>,
-    /// What to show: whitted, ao, normals, depth or cost
+    /// What to show: whitted, ao, normals, depth, cost or rt (as --rt-compat)
     #[arg(long, value_name = "NAME", default_value = Integrator::Whitted.name())]
     integrator: Integrator,
+    /// Show a BRL-CAD database as BRL-CAD's own `rt -B -J0` does: its shaders, lights, default view and 512x512 pixels
+    #[arg(long)]
+    rt_compat: bool,
     /// Samples per pixel
     #[arg(long, value_name = "N", default_value_t = 1)]
     spp: u32,
@@ -69,7 +77,7 @@ pub struct RenderArgs {
     /// Extra planes: Z, N, albedo, id.instance, id.primitive, cost.nodes, or all
     #[arg(long, value_name = "LIST", default_value = "")]
     aov: String,
-    /// Brightness of PNG files: colours times 2^STOPS
+    /// Brightness of PNG and .pix files: colours times 2^STOPS
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
     exposure: f32,
     #[command(flatten)]
@@ -89,6 +97,7 @@ enum Format {
     Exr,
     Png,
     Npy,
+    Pix,
 }
 
 /// A file to write and its format.
@@ -155,6 +164,7 @@ impl RenderArgs {
             camera,
             crop: None,
             integrator: Integrator::Whitted,
+            rt_compat: false,
             spp: 1,
             seed: 0,
             depth: 4,
@@ -177,9 +187,12 @@ impl RenderArgs {
 /// tiles have been written.
 pub fn run(args: &RenderArgs) -> Result<()> {
     let options = options(args)?;
-    let description = args.scene.load()?;
+    let description = load(args)?;
     for warning in &description.warnings {
         args.output.say(&format!("warning: {warning}"));
+    }
+    if options.integrator == Integrator::Rt {
+        check_rt(args, &description)?;
     }
     with_pool(args.threads.count(), || match args.scene.options.precision(&description) {
         Precision::F32 => picture::<f32>(args, &description, &options),
@@ -187,16 +200,42 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     })
 }
 
+/// The scene; of a database the objects that the view script names, unless `--top` names some.
+fn load(args: &RenderArgs) -> Result<Description> {
+    let mut scene = args.scene.clone();
+    if scene.options.top.is_empty() && !scene.scene.starts_with("builtin:") {
+        scene.options.top = args.camera.script()?.map(|view| view.tops).unwrap_or_default();
+    }
+    scene.load()
+}
+
+/// Whether `rt`'s lighting model knows all that the scene asks of it.
+fn check_rt(args: &RenderArgs, description: &Description) -> Result<()> {
+    let Some(looks) = &description.looks else {
+        return Err(Error::Usage(
+            "--rt-compat shows BRL-CAD databases: expected a scene file that ends in .asc".into(),
+        ));
+    };
+    for (shader, region) in unknown_shaders(looks) {
+        let what = format!("the shader `{shader}` of region {region} is not supported");
+        if !args.scene.options.lenient {
+            return Err(Error::Usage(format!("{what}; --lenient shows it as plastic")));
+        }
+        args.output.say(&format!("warning: {what}: shown as plastic"));
+    }
+    Ok(())
+}
+
 /// The options, checked before a long build starts.
 fn options(args: &RenderArgs) -> Result<RenderOptions> {
-    let (width, height) = args.camera.size.unwrap_or(DEFAULT_SIZE);
+    let (width, height) = args.camera.size.unwrap_or(if args.rt_compat { RT_SIZE } else { DEFAULT_SIZE });
     let options = RenderOptions {
         width,
         height,
         crop: args.crop,
         spp: args.spp,
         seed: args.seed,
-        integrator: args.integrator,
+        integrator: if args.rt_compat { Integrator::Rt } else { args.integrator },
         engine: args.engine.engine.clone(),
         tile: args.tile,
         depth: args.depth,
@@ -206,8 +245,8 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         count: args.output.verbose > 0,
     };
     options.check()?;
-    if args.file.format == Format::Png && !options.aovs.is_empty() {
-        return Err(Error::Usage("PNG holds colours only: --aov needs .exr or .npy".into()));
+    if matches!(args.file.format, Format::Png | Format::Pix) && !options.aovs.is_empty() {
+        return Err(Error::Usage("PNG and .pix hold colours only: --aov needs .exr or .npy".into()));
     }
     Ok(options)
 }
@@ -216,8 +255,8 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
     let engine = args.engine.find::<S>()?;
     let world = World::<S>::compile(description, args.scene.options.preset())?;
     let (width, height) = (options.width, options.height);
-    let camera = args.camera.choose(description, world.bounds(), (width, height))?;
-    let camera = Camera::new(&camera, f64::from(width) / f64::from(height))?;
+    let camera_args = if args.rt_compat { args.camera.or_default_view() } else { args.camera.clone() };
+    let camera = camera_args.ready(description, world.bounds(), (width, height))?;
     let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
     let output = render(&world, description, &camera, options, &watch)?;
     watch.bar.finish_and_clear();
@@ -312,6 +351,7 @@ fn write(target: &Target, film: &Film, info: &ImageInfo, exposure: f32) -> Resul
         Format::Exr => exr::write(&target.path, film, info, Compression::default()),
         Format::Png => png::write(&target.path, film, exposure),
         Format::Npy => write_npy(&target.path, film),
+        Format::Pix => pix::write(&target.path, film, exposure),
     }
 }
 
@@ -338,7 +378,8 @@ fn target(text: &str) -> std::result::Result<Target, String> {
         Some("exr") => Format::Exr,
         Some("png") => Format::Png,
         Some("npy") => Format::Npy,
-        _ => return Err("expected a file name that ends in .exr, .png or .npy".into()),
+        Some("pix") => Format::Pix,
+        _ => return Err("expected a file name that ends in .exr, .png, .npy or .pix".into()),
     };
     Ok(Target { path, format })
 }

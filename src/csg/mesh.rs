@@ -138,7 +138,8 @@ impl<S: Real> Mesh<S> {
 
     fn block<V: Lanes<Scalar = S>>(&self, line: &Packet<V>, leaf: bvh::Child, lanes: u32, list: &mut Vec<Crossing>) {
         let block = &self.blocks[leaf.index as usize];
-        Triangle::intersect(line, block, (1 << leaf.count) - 1, lanes, |found, tested, triangle| {
+        let every = V::splat(V::Scalar::INFINITY);
+        Triangle::intersect(line, every, block, (1 << leaf.count) - 1, lanes, |found, tested, triangle| {
             let mut hit = found.hit.bits() & tested & lanes;
             if hit == 0 {
                 return;

@@ -4,7 +4,7 @@
 #![allow(unsafe_code, reason = "instructions no crate offers as safe functions")]
 
 use super::{LaneMask, Lanes};
-use wide::{f32x4, f32x8, f32x16, u16x8, u32x16};
+use wide::{f32x4, f32x8, f32x16, u16x8, u32x16, u64x8};
 
 /// The same eight values in both halves.
 #[inline(always)]
@@ -45,6 +45,28 @@ pub fn prefetch<T>(list: &[T], i: usize) {
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (list, i);
+}
+
+/// [`prefetch`] from either of two lists, without a branch: which one is usually a surprise.
+#[inline(always)]
+pub fn prefetch_either<A, B>(first: &[A], second: &[B], from_second: bool, i: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let (list, len, size) = if from_second {
+            (second.as_ptr().cast::<i8>(), second.len(), size_of::<B>())
+        } else {
+            (first.as_ptr().cast::<i8>(), first.len(), size_of::<A>())
+        };
+        let element = list.wrapping_add(i.min(len) * size);
+        let lines = const { if size_of::<A>() > size_of::<B>() { size_of::<A>() } else { size_of::<B>() } };
+        for line in (0..lines).step_by(64) {
+            // SAFETY: a prefetch reads nothing the program can see and does not fault, whatever the address.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(element.wrapping_add(line)) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (first, second, from_second, i);
 }
 
 /// The least of eight keys and its first position.
@@ -154,6 +176,56 @@ fn list_bits_portable(mask: u32, list: &mut [u8; 16]) -> usize {
     count
 }
 
+/// Eight words of 64 bits.
+#[derive(Clone, Copy, Debug)]
+pub struct Marks(u64x8);
+
+impl Marks {
+    /// No bit set.
+    #[inline(always)]
+    pub fn none() -> Self {
+        Self(u64x8::splat(0))
+    }
+
+    /// Sets bit `bit` in the words whose bit is set in `words`.
+    #[inline(always)]
+    #[must_use]
+    pub fn with(self, words: u32, bit: u32) -> Self {
+        #[cfg(target_feature = "avx512f")]
+        {
+            use std::arch::x86_64::{_mm512_maskz_set1_epi64, _mm512_storeu_si512};
+            let mut set = [0; 8];
+            // SAFETY: compiled only where the whole build has AVX-512F; the store fills the 64 bytes of `set`.
+            unsafe {
+                let own = _mm512_maskz_set1_epi64(words as u8, 1 << bit);
+                _mm512_storeu_si512(set.as_mut_ptr().cast(), own);
+            }
+            Self(self.0 | u64x8::new(set))
+        }
+        #[cfg(not(target_feature = "avx512f"))]
+        self.with_portable(words, bit)
+    }
+
+    #[cfg(any(test, not(target_feature = "avx512f")))]
+    fn with_portable(self, words: u32, bit: u32) -> Self {
+        const PLACES: u64x8 = u64x8::new([1, 2, 4, 8, 16, 32, 64, 128]);
+        let wanted = (u64x8::splat(words.into()) & PLACES).simd_eq(PLACES);
+        Self(self.0 | u64x8::splat(1 << bit) & wanted)
+    }
+
+    /// Words that are not zero, as bits.
+    #[inline(always)]
+    pub fn not_zero(self) -> u32 {
+        !self.0.simd_eq(u64x8::splat(0)).to_bitmask() & 0xff
+    }
+
+    /// The words.
+    #[inline(always)]
+    pub fn words(self) -> [u64; 8] {
+        self.0.to_array()
+    }
+}
+
 /// A 16x16 tree of shuffles: 45 instructions instead of 16 reductions.
 #[cfg(target_feature = "avx512f")]
 mod avx512 {
@@ -253,6 +325,16 @@ mod tests {
                 assert_eq!(list[..count], want);
             }
         }
+    }
+
+    #[test]
+    fn marks_are_set_where_they_are_wanted() {
+        let marks = Marks(u64x8::new([0, 1, 2, 3, 4, 5, 6, 7]));
+        for (words, bit) in [(0b1010_0110, 63), (0xff, 0), (0, 5), (1, 40)] {
+            let want: [u64; 8] = std::array::from_fn(|i| i as u64 | u64::from(words >> i & 1) << bit);
+            assert_eq!((marks.with(words, bit).words(), marks.with_portable(words, bit).words()), (want, want));
+        }
+        assert_eq!((marks.not_zero(), Marks::none().not_zero()), (0xfe, 0));
     }
 
     #[test]

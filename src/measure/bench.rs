@@ -103,7 +103,7 @@ struct Subject<'a, S: 'static> {
 }
 
 /// Answers that may be timed and, for a peer, how they compare with ours.
-type Admission<S> = std::result::Result<(Answers<S>, Agreement), Outcome>;
+type Admission<S> = std::result::Result<(Answers<S>, Agreement), Box<Outcome>>;
 
 impl<S: Engines> Subject<'_, S> {
     fn class(
@@ -184,7 +184,7 @@ impl<S: Engines> Subject<'_, S> {
             };
             let (agreement, outcome) = match place {
                 Ok((place, agreement)) => (agreement, self.outcome(&series[place], scalar, batches, kind)),
-                Err(outcome) => (Agreement::default(), Some(outcome)),
+                Err(outcome) => (Agreement::default(), Some(*outcome)),
             };
             let row = |outcome| row(name(tracer), self.facts_of(tracer), peer, &agreement, outcome);
             rows.extend(outcome.map(row));
@@ -218,7 +218,7 @@ impl<S: Engines> Subject<'_, S> {
         match &agreement.first {
             Some(first) if !agreement.passes() => {
                 let (count, rays) = (agreement.differences, agreement.rays);
-                Err(Outcome::Wrong(format!("{count} of {rays} rays differ from scalar, {first}")))
+                Err(Box::new(Outcome::Wrong(format!("{count} of {rays} rays differ from scalar, {first}"))))
             }
             _ => Ok((answers, agreement)),
         }
@@ -247,16 +247,17 @@ impl<S: Engines> Subject<'_, S> {
     ) -> Admission<S> {
         let tests = rays.saturating_mul(self.world.assembly.instanced_prims());
         if engine.name() == "brute" && tests > BRUTE_LIMIT {
-            return Err(Outcome::Skipped(format!("{tests} ray-primitive tests per pass, limit {BRUTE_LIMIT}")));
+            let why = format!("{tests} ray-primitive tests per pass, limit {BRUTE_LIMIT}");
+            return Err(Box::new(Outcome::Skipped(why)));
         }
         if let Some(why) = rejected {
-            return Err(Outcome::Wrong(why.into()));
+            return Err(Box::new(Outcome::Wrong(why.into())));
         }
         let mut answers = scalar.clone();
         self.workers.pass(engine, self.world, batches, &mut answers);
         let oracle = || Cow::Borrowed(self.oracle);
         let admitted = self.workers.install(|| truth::admit(engine, batches, scalar, &answers, oracle));
-        admitted.map(|agreement| (answers, agreement)).map_err(Outcome::Wrong)
+        admitted.map(|agreement| (answers, agreement)).map_err(|why| Box::new(Outcome::Wrong(why)))
     }
 
     fn outcome(
@@ -275,6 +276,7 @@ impl<S: Engines> Subject<'_, S> {
         Some(Outcome::Timed {
             seconds,
             repeat: one.seconds.len(),
+            passes: one.seconds.clone(),
             hits: one.answers.hit_count(),
             checksum: one.answers.checksum(),
             ratio: baseline.and_then(|b| paired_ratio_median(b, &one.seconds)),
@@ -287,7 +289,7 @@ impl<S: Engines> Subject<'_, S> {
 /// One tracer's place among the series with how its answers compare, or why it has none.
 struct Entry<'a, S> {
     tracer: Tracer<'a, S>,
-    place: std::result::Result<(usize, Agreement), Outcome>,
+    place: std::result::Result<(usize, Agreement), Box<Outcome>>,
 }
 
 fn name<S: Engines>(tracer: Tracer<'_, S>) -> &'static str {

@@ -1,46 +1,36 @@
-//! Two result files side by side: what moved, and whether that is more than noise.
+//! Two result files, or two folders of runs, side by side: what moved, and whether that is more than noise.
 //!
-//! Every row of a bench run has a median over interleaved rounds and the median absolute deviation of those rounds.
-//! The standard error of a median of n normal samples is about 1.2533 sigma / sqrt(n), and 1.4826 times the deviation
-//! estimates sigma (Huber, Ronchetti, "Robust Statistics", 2009). Two runs were not interleaved with each other, so the
-//! speed of the machine may have changed between them; where both runs timed `scalar`, ratios to it are compared, and
-//! that change cancels.
+//! Runs that took turns (old, new, old, new, ..., see `bench --against`) share the machine's mood, so each turn gives one
+//! factor, and the bootstrap over turns and rounds says how sure their median is. Two single runs were not interleaved with
+//! each other: the machine may have changed its speed between them, which only cancels in ratios to `scalar` of the same
+//! rounds; what still differs then (caches, pages, placement) was measured and widens what counts as no difference.
+//!
+//! Files of older versions have no single passes. There, the standard error of a median of n normal samples is about
+//! 1.2533 sigma / sqrt(n), and 1.4826 times the median absolute deviation estimates sigma (Huber, Ronchetti, "Robust
+//! Statistics", 2009).
 
-use std::collections::BTreeMap;
+mod read;
+
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::measure::intervals::{Estimate, Interval, ratio_of_medians, ratio_over_turns};
+pub use read::{Figure, Key, Turn, read};
 
-/// Standard errors that a difference must exceed.
+/// Standard errors that bound the interval of a file without single passes.
 const SIGMAS: f64 = 3.0;
 
-/// Relative difference that runs of the same binary show beside the rounds' own scatter: caches, pages, placement.
+/// Fewest turns that are judged as turns.
+const MIN_TURNS: usize = 3;
+
+/// Relative difference that does not count between runs that took turns.
+const MARGIN: f64 = 0.01;
+
+/// Relative difference that single runs of the same binary show beside the rounds' own scatter: caches, pages, placement.
 const DRIFT: f64 = 0.02;
 
 /// The same for rates, which move with the load of the machine: nothing cancels.
 const DRIFT_OF_RATES: f64 = 0.33;
-
-/// Largest file that is read.
-const MAX_BYTES: u64 = 64 << 20;
-
-/// What a row is about. Shape: scene hash, class, query, engine or peer with its mode, precision, threads, rays.
-pub type Key = [String; 7];
-
-const KEY_COLUMNS: [&str; 8] = ["scene_hash", "class", "query", "engine", "peer_mode", "precision", "threads", "rays"];
-
-/// One timed row.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Figure {
-    /// Scene name, for people.
-    pub scene: String,
-    /// Million rays per second, median.
-    pub mrays: f64,
-    /// Times as fast as `scalar` in the same run.
-    pub ratio: Option<f64>,
-    /// Relative standard error of the median.
-    pub error: f64,
-}
 
 /// What became of one row.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -55,118 +45,101 @@ pub struct Change {
     pub engine: String,
     /// `f32` or `f64`.
     pub precision: String,
-    /// Million rays per second before.
+    /// Million rays per second before (of several turns: the first).
     pub old: Option<f64>,
     /// Million rays per second now.
     pub new: Option<f64>,
     /// New over old: of the ratios to `scalar` where both have one, else of the rates.
     pub factor: Option<f64>,
-    /// Relative difference that noise explains.
-    pub noise: Option<f64>,
+    /// Where the true factor is, by the samples alone.
+    pub interval: Option<Interval>,
+    /// Relative difference that does not count beside.
+    pub margin: Option<f64>,
+    /// What was compared: `turns`, `ratios to scalar` or `rates`.
+    pub basis: Option<&'static str>,
     /// `faster`, `slower`, `no difference seen`, `only old` or `only new`.
     pub verdict: &'static str,
 }
 
-/// Reads the timed rows of `path`: a `bench.csv`, or a folder that holds one.
-///
-/// # Errors
-/// Unreadable files; with line and column: rows that are not CSV, columns that are missing, cells that are no numbers,
-/// two rows about the same thing.
-pub fn read(path: &Path) -> Result<BTreeMap<Key, Figure>> {
-    let path = if path.is_dir() { path.join("bench.csv") } else { PathBuf::from(path) };
-    let size = std::fs::metadata(&path).map_err(|e| Error::io(&path, e))?.len();
-    if size > MAX_BYTES {
-        return Err(Error::whole(&path, format!("expected at most {MAX_BYTES} bytes of results, found {size}")));
-    }
-    let text = std::fs::read(&path).map_err(|e| Error::io(&path, e))?;
-    parse(&path, &text)
-}
-
-fn parse(path: &Path, text: &[u8]) -> Result<BTreeMap<Key, Figure>> {
-    let mut reader = csv::Reader::from_reader(text);
-    let wrong = |e: csv::Error| {
-        let line = e.position().map_or(1, csv::Position::line);
-        Error::at_line(path, line, 1, format!("expected a row of results: {e}"))
+/// Every row of either side.
+pub fn compare(old: &[Turn], new: &[Turn]) -> Vec<Change> {
+    let keys: BTreeSet<&Key> = old.iter().chain(new).flat_map(|turn| turn.figures.keys()).collect();
+    let turns = interleaved(old, new);
+    let find = |turns: &'_ [Turn], key: &Key| -> Vec<Figure> {
+        turns.iter().filter_map(|turn| turn.figures.get(key)).cloned().collect()
     };
-    let header = reader.headers().map_err(wrong)?.clone();
-    let column = |name: &str| {
-        let found = header.iter().position(|h| h == name);
-        found.ok_or_else(|| Error::at_line(path, 1, 1, format!("expected a column `{name}`, as `bench -o` writes it")))
-    };
-    let mut keys = [0; KEY_COLUMNS.len()];
-    for (to, name) in keys.iter_mut().zip(KEY_COLUMNS) {
-        *to = column(name)?;
-    }
-    let [status, scene, repeat, mrays] = ["status", "scene", "repeat", "median_mrays_per_s"].map(column);
-    let (status, scene, repeat, mrays) = (status?, scene?, repeat?, mrays?);
-    let (mad, ratio) = (column("mad_seconds")?, column("ratio_to_scalar")?);
-    let mut figures = BTreeMap::new();
-    for record in reader.records() {
-        let record = record.map_err(wrong)?;
-        let line = record.position().map_or(1, csv::Position::line);
-        let cell = |i: usize| record.get(i).unwrap_or_default();
-        if cell(status) != "ok" {
-            continue;
-        }
-        let number = |i: usize| {
-            let value = cell(i).parse::<f64>().ok().filter(|x| x.is_finite() && *x >= 0.0);
-            let expected = || format!("expected a number in `{}`, found `{}`", &header[i], cell(i));
-            value.ok_or_else(|| Error::at_line(path, line, 1, expected()))
-        };
-        let rays = number(keys[7])?;
-        let figure = Figure {
-            scene: cell(scene).into(),
-            mrays: number(mrays)?,
-            ratio: if cell(ratio).is_empty() { None } else { Some(number(ratio)?) },
-            error: 1.2533 * 1.4826 * number(mad)? * number(mrays)? * 1e6
-                / rays.max(1.0)
-                / number(repeat)?.max(1.0).sqrt(),
-        };
-        let [hash, class, query, engine, mode, precision, threads, rays] = keys.map(|i| cell(i).to_string());
-        let engine = if mode.is_empty() { engine } else { format!("{engine} [{mode}]") };
-        if figures.insert([hash, class, query, engine, precision, threads, rays], figure).is_some() {
-            return Err(Error::at_line(path, line, 1, "a second row about the same rays and engine"));
-        }
-    }
-    Ok(figures)
+    keys.into_iter().map(|key| change(key, &find(old, key), &find(new, key), turns)).collect()
 }
 
-/// Every row of either run.
-pub fn compare(old: &BTreeMap<Key, Figure>, new: &BTreeMap<Key, Figure>) -> Vec<Change> {
-    let keys: std::collections::BTreeSet<&Key> = old.keys().chain(new.keys()).collect();
-    keys.into_iter().map(|key| change(key, old.get(key), new.get(key))).collect()
+/// Whether the runs took turns: as many on either side, and each pair began before the next.
+fn interleaved(old: &[Turn], new: &[Turn]) -> bool {
+    let pairs: Vec<[&str; 2]> = old.iter().zip(new).map(|(a, b)| [a.date.as_str(), b.date.as_str()]).collect();
+    let in_order = pairs.windows(2).all(|w| w[0].iter().max() <= w[1].iter().min());
+    old.len() == new.len() && old.len() >= MIN_TURNS && in_order
 }
 
-fn change(key: &Key, old: Option<&Figure>, new: Option<&Figure>) -> Change {
+fn change(key: &Key, old: &[Figure], new: &[Figure], turns: bool) -> Change {
     let [_, class, query, engine, precision, ..] = key.clone();
-    let scene = old.or(new).map_or(String::new(), |f| f.scene.clone());
+    let scene = old.iter().chain(new).next().map_or(String::new(), |f| f.scene.clone());
     let mut change = Change {
         scene,
         class,
         query,
         engine,
         precision,
-        old: old.map(|f| f.mrays),
-        new: new.map(|f| f.mrays),
+        old: old.first().map(|f| f.mrays),
+        new: new.first().map(|f| f.mrays),
         factor: None,
-        noise: None,
-        verdict: if old.is_some() { "only old" } else { "only new" },
+        interval: None,
+        margin: None,
+        basis: None,
+        verdict: if new.is_empty() { "only old" } else { "only new" },
     };
-    if let (Some(old), Some(new)) = (old, new) {
-        // `scalar` itself has the ratio 1 in every run: only its rate can tell.
-        let ratios = old.ratio.zip(new.ratio).filter(|_| change.engine != "scalar");
-        let (before, after) = ratios.unwrap_or((old.mrays, new.mrays));
-        let factor = if before > 0.0 { after / before } else { f64::INFINITY };
-        let drift = if ratios.is_some() { DRIFT } else { DRIFT_OF_RATES };
-        let noise = drift + SIGMAS * old.error.hypot(new.error);
-        change.verdict = match factor {
-            f if f > 1.0 + noise => "faster",
-            f if f < 1.0 / (1.0 + noise) => "slower",
-            _ => "no difference seen",
-        };
-        (change.factor, change.noise) = (Some(factor), Some(noise));
+    if old.is_empty() || new.is_empty() {
+        return change;
+    }
+    // `scalar` itself has the ratio 1 in every run: only its rate can tell.
+    let ratios = change.engine != "scalar";
+    let (estimate, margin, basis) = match (turns, ratios) {
+        (true, _) => {
+            let every = |side: &[Figure]| side.iter().all(|f| !f.ratios.is_empty());
+            let by_ratio = ratios && every(old) && every(new);
+            let samples = |f: &Figure| if by_ratio { f.ratios.clone() } else { f.rates.clone() };
+            let pairs: Vec<_> = new.iter().zip(old).map(|(n, o)| (samples(n), samples(o))).collect();
+            (ratio_over_turns(&pairs), MARGIN, "turns")
+        }
+        _ => single(pooled(old), pooled(new), ratios),
+    };
+    if let Some(Estimate { value, interval }) = estimate {
+        change.verdict = interval.verdict(margin).name();
+        (change.factor, change.interval) = (Some(value), Some(interval));
+        (change.margin, change.basis) = (Some(margin), Some(basis));
     }
     change
+}
+
+/// All passes of one side as if of one run.
+fn pooled(figures: &[Figure]) -> Figure {
+    let mut all = figures[0].clone();
+    for figure in &figures[1..] {
+        all.rates.extend(&figure.rates);
+        all.ratios.extend(&figure.ratios);
+    }
+    all
+}
+
+/// Two runs that were not interleaved with each other.
+fn single(old: Figure, new: Figure, may_use_ratios: bool) -> (Option<Estimate>, f64, &'static str) {
+    let both = old.ratio.zip(new.ratio).filter(|_| may_use_ratios);
+    let (basis, margin) = if both.is_some() { ("ratios to scalar", DRIFT) } else { ("rates", DRIFT_OF_RATES) };
+    let [samples_old, samples_new] = if both.is_some() { [&old.ratios, &new.ratios] } else { [&old.rates, &new.rates] };
+    if !samples_old.is_empty() && !samples_new.is_empty() {
+        return (ratio_of_medians(samples_new, samples_old), margin, basis);
+    }
+    let (before, after) = both.unwrap_or((old.mrays, new.mrays));
+    let value = if before > 0.0 { after / before } else { f64::INFINITY };
+    let noise = 1.0 + SIGMAS * old.error.hypot(new.error);
+    (Some(Estimate { value, interval: Interval { low: value / noise, high: value * noise } }), margin, basis)
 }
 
 /// The changes for people.
@@ -180,15 +153,16 @@ pub fn table(changes: &[Change]) -> String {
             scene = Some(&c.scene);
             let _infallible = writeln!(
                 text,
-                "{}\n  {:<8} {:<7} {:<width$} {:<3} {:>9} {:>9} {:>8} {:>8}  verdict",
-                c.scene, "rays", "query", "engine", "", "old", "new", "factor", "noise"
+                "{}\n  {:<8} {:<7} {:<width$} {:<3} {:>9} {:>9} {:>8} {:>17} {:>7}  verdict",
+                c.scene, "rays", "query", "engine", "", "old", "new", "factor", "interval", "margin"
             );
         }
-        let noise = c.noise.map_or("-".into(), |n| format!("{:.1} %", 100.0 * n));
         let factor = c.factor.map_or("-".into(), |f| format!("{f:.3}"));
+        let interval = c.interval.map_or("-".into(), |i| format!("{:.3} to {:.3}", i.low, i.high));
+        let margin = c.margin.map_or("-".into(), |m| format!("{:.0} %", 100.0 * m));
         let _infallible = writeln!(
             text,
-            "  {:<8} {:<7} {:<width$} {:<3} {:>9} {:>9} {factor:>8} {noise:>8}  {}",
+            "  {:<8} {:<7} {:<width$} {:<3} {:>9} {:>9} {factor:>8} {interval:>17} {margin:>7}  {}",
             c.class,
             c.query,
             c.engine,
@@ -198,71 +172,21 @@ pub fn table(changes: &[Change]) -> String {
             c.verdict
         );
     }
-    text.push_str(
-        "old, new: million rays per second, median; factor: new over old, of the ratios to `scalar` where both runs have\n\
-         them; noise: three standard errors of both medians, and 2 % (rates: 33 %) for what differs between two runs.\n",
+    let faster = changes.iter().filter(|c| c.verdict == "faster").count();
+    let slower = changes.iter().filter(|c| c.verdict == "slower").count();
+    let _infallible = writeln!(
+        text,
+        "{} rows compared: {faster} faster, {slower} slower{}",
+        changes.len(),
+        if faster + slower == 0 { "; no difference seen" } else { "" }
     );
+    text.push_str(LEGEND);
     text
 }
 
+const LEGEND: &str = "old, new: million rays per second, median; factor: new over old, of the ratios to `scalar` of the same rounds where\n\
+     both runs have them; interval: 95 % bootstrap; a row is faster or slower if its whole interval is beyond the margin:\n\
+     1 % for runs that took turns (bench --against), 2 % between two single runs, 33 % where only rates can be compared.\n";
+
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const HEADER: &str = "threads,scene,scene_hash,class,query,engine,precision,rays,status,repeat,median_mrays_per_s,\
-        mad_seconds,ratio_to_scalar,peer_mode\n";
-
-    fn parsed(rows: &str) -> Result<BTreeMap<Key, Figure>> {
-        parse(Path::new("a.csv"), format!("{HEADER}{rows}").as_bytes())
-    }
-
-    fn row(engine: &str, mrays: f64, mad: f64, ratio: &str) -> String {
-        format!("1,box,abc,primary,closest,{engine},f32,1000000,ok,9,{mrays},{mad},{ratio},\n")
-    }
-
-    /// A million rays at 2 Mrays/s take 0.5 s; 0.001 s deviation over 9 rounds: 1.2533 1.4826 0.001 / 0.5 / 3.
-    #[test]
-    fn errors_by_hand() {
-        let figures = parsed(&row("tile", 2.0, 0.001, "3")).unwrap();
-        let figure = figures.values().next().unwrap();
-        assert!((figure.error - 1.2533 * 1.4826 * 0.001 / 0.5 / 3.0).abs() < 1e-12, "{figure:?}");
-        assert_eq!((figure.mrays, figure.ratio), (2.0, Some(3.0)));
-    }
-
-    #[test]
-    fn what_moved_and_what_did_not() {
-        let old = row("scalar", 2.0, 0.0, "1") + &row("tile", 20.0, 0.0, "10") + &row("gone", 1.0, 0.0, "0.5");
-        // The machine became half as fast; tile gained a tenth on top, packet is new.
-        let new = row("scalar", 1.0, 0.0, "1") + &row("tile", 11.0, 0.0, "11") + &row("packet", 4.0, 0.0, "4");
-        let changes = compare(&parsed(&old).unwrap(), &parsed(&new).unwrap());
-        let of = |engine: &str| changes.iter().find(|c| c.engine == engine).unwrap();
-        assert_eq!((of("tile").verdict, of("tile").factor), ("faster", Some(1.1)));
-        assert_eq!(
-            (of("scalar").verdict, of("gone").verdict, of("packet").verdict),
-            ("slower", "only old", "only new")
-        );
-        let text = table(&changes);
-        assert!(text.contains("1.100    2.0 %  faster"), "{text}");
-    }
-
-    #[test]
-    fn noise_is_no_difference() {
-        let (old, new) = (row("tile", 20.0, 0.002, "10"), row("tile", 21.0, 0.002, "10.5"));
-        let changes = compare(&parsed(&old).unwrap(), &parsed(&new).unwrap());
-        assert_eq!(changes[0].verdict, "no difference seen", "{changes:?}");
-        assert_eq!(compare(&parsed(&old).unwrap(), &parsed(&old).unwrap())[0].verdict, "no difference seen");
-    }
-
-    #[test]
-    fn faults_say_where() {
-        let text = |result: Result<BTreeMap<Key, Figure>>| result.unwrap_err().to_string();
-        assert!(text(parse(Path::new("a.csv"), b"threads,scene\n")).contains("`scene_hash`"));
-        let word = text(parsed(&row("tile", 1.0, 0.0, "1").replace("ok,9", "ok,nine")));
-        assert!(word.contains("a.csv:2:") && word.contains("`nine`"), "{word}");
-        let short = text(parsed("1,box\n"));
-        assert!(short.contains("a.csv:2:"), "{short}");
-        let twice = row("tile", 1.0, 0.0, "1").repeat(2);
-        assert!(text(parsed(&twice)).contains("a.csv:3:"));
-        assert!(parsed("1,box,abc,primary,closest,brute,f32,1,skipped: why,,,,,\n").unwrap().is_empty());
-    }
-}
+mod tests;

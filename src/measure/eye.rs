@@ -74,7 +74,7 @@ fn primary_rays(camera: &CameraDescription, (width, height): (u32, u32)) -> Resu
     let whole = PixelRect { x0: 0, y0: 0, x1: width, y1: height };
     let tile = |tile| {
         let mut rays = Rays::new(0);
-        fill_tile(&camera, &tiling, tile, whole, SubPixel::Centre, &mut rays);
+        fill_tile(&camera, &tiling, tile, whole, SubPixel::Anchor, &mut rays);
         rays
     };
     Ok((0..tiling.tiles()).into_par_iter().map(tile).collect())

@@ -62,6 +62,8 @@ pub enum Outcome {
         seconds: Summary,
         /// Passes.
         repeat: usize,
+        /// Seconds of every pass in the order they ran; the i-th passes of all engines belong to one round.
+        passes: Vec<f64>,
         /// Rays that hit.
         hits: u64,
         /// Checksum of the answers.
@@ -127,7 +129,7 @@ impl Row {
 const COLUMNS: &str = "revision,date,cpu,isa,flags,threads,scene,scene_hash,prims,class,query,engine,precision,rays,\
     status,hits,repeat,best_mrays_per_s,median_mrays_per_s,spread,mad_seconds,ratio_to_scalar,node_lane_use,\
     prim_lane_use,checksum,build_seconds,bytes,peer_mode,peer_description,quoted,ties,differences,ours_over_peer,\
-    command";
+    command,seconds";
 
 /// The file: a header line and one line per row, RFC 4180 quoting, lines end in LF.
 pub fn csv(run: &Run, rows: &[Row]) -> String {
@@ -147,7 +149,7 @@ fn line(run: &Run, row: &Row) -> String {
     cells.push(row.rays.to_string());
     let optional = |x: &Option<f64>| x.map_or(String::new(), |x| format!("{x:.4}"));
     match &row.outcome {
-        Outcome::Timed { seconds, repeat, hits, checksum, ratio, node_lane_use, prim_lane_use } => {
+        Outcome::Timed { seconds, repeat, hits, checksum, ratio, node_lane_use, prim_lane_use, .. } => {
             cells.extend(["ok".into(), hits.to_string(), repeat.to_string()]);
             cells.extend([seconds.min, seconds.median].map(|s| format!("{:.4}", row.mrays(s))));
             cells.extend([format!("{:.4}", seconds.spread), format!("{:.9}", seconds.mad)]);
@@ -165,6 +167,10 @@ fn line(run: &Run, row: &Row) -> String {
     cells.extend([row.ties, row.differences].map(|n| n.to_string()));
     cells.push(peer.map_or(String::new(), |peer| optional(&peer.lead)));
     cells.push(run.command.clone());
+    cells.push(match &row.outcome {
+        Outcome::Timed { passes, .. } => passes.iter().map(|s| format!("{s:.9}")).collect::<Vec<_>>().join(" "),
+        _ => String::new(),
+    });
     cells.iter().map(|c| quoted(c)).collect::<Vec<_>>().join(",")
 }
 
@@ -284,6 +290,7 @@ mod tests {
         row(Outcome::Timed {
             seconds: summary(&[1.0, 0.5, 1.0]).unwrap(),
             repeat: 3,
+            passes: vec![1.0, 0.5, 1.0],
             hits: 7,
             checksum: 0xabc,
             ratio: Some(2.0),
@@ -333,6 +340,7 @@ mod tests {
         assert_eq!(cell(1, "spread"), "0.5000");
         assert_eq!(cell(1, "ratio_to_scalar"), "2.0000");
         assert_eq!(cell(1, "checksum"), "0000000000000abc");
+        assert_eq!(cell(1, "seconds"), "1.000000000 0.500000000 1.000000000");
         assert_eq!(cell(2, "status"), "skipped: too, many");
         assert_eq!(cell(3, "status"), "wrong: ray 3");
         for row in [2, 3] {

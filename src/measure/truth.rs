@@ -92,13 +92,28 @@ pub fn admit<'o, S: Engines>(
     if agreement.unlike.is_empty() {
         return Ok(agreement);
     }
-    let mut unlike = agreement.unlike.iter().copied().peekable();
-    let chosen = places(batches).enumerate().filter(|(n, _)| unlike.next_if_eq(&(*n as u64)).is_some()).collect();
-    let counts = judge_these(&oracle(), OWN_MARGIN_FACTOR, batches, answers, chosen);
+    let counts = judge_rays(&oracle(), OWN_MARGIN_FACTOR, batches, answers, &agreement.unlike);
     match counts.samples.first() {
         None => Ok(agreement),
         Some(first) => Err(format!("the oracle rejects {} answers, {first}", counts.unexplained)),
     }
+}
+
+/// Judges the rays called `numbers` (counted through the batches, ascending), see [`judge`].
+pub fn judge_rays<S: Engines>(
+    oracle: &Oracle,
+    margin_factor: f64,
+    batches: &[Rays<S>],
+    answers: &Answers<S>,
+    numbers: &[u64],
+) -> Counts {
+    judge_these(oracle, margin_factor, batches, answers, chosen(batches, numbers))
+}
+
+/// Number, batch and slot of the rays called `numbers`, ascending.
+fn chosen<S: Real>(batches: &[Rays<S>], numbers: &[u64]) -> Vec<(usize, (usize, usize))> {
+    let mut numbers = numbers.iter().copied().peekable();
+    places(batches).enumerate().filter(|(n, _)| numbers.next_if_eq(&(*n as u64)).is_some()).collect()
 }
 
 /// Batch and slot of every ray, in order.

@@ -28,11 +28,7 @@ impl<V: Lanes> Packet<V> {
     /// Prepares rays for traversal.
     #[inline(always)]
     pub fn new(org: Lanes3<V>, dir: Lanes3<V>, t_min: V) -> Self {
-        let size = dir.map(V::abs);
-        let x_over_y = size[0].cmp_ge(size[1]);
-        let x = x_over_y & size[0].cmp_ge(size[2]);
-        let y = !x & size[1].cmp_ge(size[2]);
-        let z = !x & !y;
+        let [x, y, z] = Self::dominant_axes(dir);
         let pick = |a: V, b: V, c: V| V::select(x, a, V::select(y, b, c));
         let scale = V::constant(1.0) / pick(dir[0], dir[1], dir[2]);
         Self {
@@ -53,12 +49,26 @@ impl<V: Lanes> Packet<V> {
         let org = [load(&rays.org[0]), load(&rays.org[1]), load(&rays.org[2])];
         let dir = [load(&rays.dir[0]), load(&rays.dir[1]), load(&rays.dir[2])];
         let (t_min, t_max) = (load(&rays.t_min), load(&rays.t_max));
+        (Self::new(org, dir, t_min), t_max, Self::live(org, dir, t_min.cmp_le(t_max)))
+    }
+
+    /// Lanes whose direction is largest along x, y, z.
+    #[inline(always)]
+    fn dominant_axes(dir: Lanes3<V>) -> [V::Mask; 3] {
+        let size = dir.map(V::abs);
+        let x = size[0].cmp_ge(size[1]) & size[0].cmp_ge(size[2]);
+        let y = !x & size[1].cmp_ge(size[2]);
+        [x, y, !x & !y]
+    }
+
+    /// Of the lanes with a segment, those that can hit something.
+    #[inline(always)]
+    fn live(org: Lanes3<V>, dir: Lanes3<V>, segment: V::Mask) -> u32 {
         let most = V::splat(V::Scalar::MAX);
         let finite = |v: Lanes3<V>| v[0].abs().cmp_le(most) & v[1].abs().cmp_le(most) & v[2].abs().cmp_le(most);
         let zero = V::constant(0.0);
         let points = zero.cmp_lt(dir[0].abs()) | zero.cmp_lt(dir[1].abs()) | zero.cmp_lt(dir[2].abs());
-        let live = finite(org) & finite(dir) & points & t_min.cmp_le(t_max);
-        (Self::new(org, dir, t_min), t_max, live.bits())
+        (finite(org) & finite(dir) & points & segment).bits()
     }
 
     /// The same rays in an instance's space; `floor` is where they enter the instance's box.

@@ -74,7 +74,8 @@ pub fn render_with<S: Real>(
 ) -> Result<RenderOutput> {
     let (tiling, window) = options.check()?;
     let start = Instant::now();
-    let shader = Shader::new(world, description, engine, headlight(camera), options.settings());
+    let shader =
+        Shader::new(world, description, engine, headlight(camera), options.settings()).with_rt(description, camera);
     let job = Job { shader, camera, tiling, rect: rect_of(window), options, progress };
     let tiles = tiling.tiles_in(job.rect);
     let painter = Mutex::new(Painter::new(options.width, options.height, window, &options.aovs));
@@ -164,7 +165,7 @@ impl<S: Real> Job<'_, S> {
                 return false;
             }
             let sub_pixel = match self.options.spp {
-                1 => SubPixel::Centre,
+                1 => SubPixel::Anchor,
                 _ => SubPixel::Sample { sample, seed: self.options.seed },
             };
             fill_tile(self.camera, &self.tiling, tile, self.rect, sub_pixel, &mut memory.rays);

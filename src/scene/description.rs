@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
+use super::brlcad::describe::Looks;
 use super::mesh::Mesh;
 use super::solids::SolidTree;
 
@@ -44,6 +45,8 @@ pub struct Description {
     pub ambient: DVec3,
     /// Precision this scene asks for (`None`: f32).
     pub precision: Option<Precision>,
+    /// Looks of a BRL-CAD database's regions, which only its own lighting model knows; object 0 has a part for each.
+    pub looks: Option<Arc<Looks>>,
     /// Things worth telling the user (`info` prints them): ignored statements, unknown properties.
     pub warnings: Vec<String>,
 }
@@ -194,6 +197,7 @@ impl Description {
             background: DVec3::ZERO,
             ambient: DVec3::splat(0.1),
             precision: None,
+            looks: None,
             warnings: Vec::new(),
         }
     }

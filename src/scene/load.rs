@@ -12,17 +12,19 @@ use super::description::{Description, Item, ItemKind};
 use super::kdl::meshes::{MeshFile, MeshFiles, add_mesh_materials};
 use super::mesh::Mesh;
 use super::reference::References;
-use super::{builtin, gltf, kdl, obj, ply, stl, unpack};
+use super::{brlcad, builtin, gltf, kdl, obj, ply, stl, unpack};
 use crate::error::{Error, Result, nearest_name};
 
 /// Extensions that [`load`] reads; all but `kdl` may also be packed (`.ply.gz`, `.glb.zst`).
-pub const EXTENSIONS: [&str; 6] = ["kdl", "obj", "ply", "stl", "gltf", "glb"];
+pub const EXTENSIONS: [&str; 7] = ["kdl", "obj", "ply", "stl", "gltf", "glb", "asc"];
 
 /// How to open a scene.
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
     /// `--set NAME=VALUE` pairs, applied to the parameters of a scene file.
     pub set: Vec<(String, String)>,
+    /// Of a BRL-CAD database: what to show.
+    pub brlcad: brlcad::describe::Options,
     /// Allow references to files that leave the scene file's folder.
     pub allow_outside: bool,
 }
@@ -39,6 +41,7 @@ pub fn load(scene: &str, options: &LoadOptions) -> Result<Description> {
     let mut description = match extension(path)?.as_str() {
         "kdl" => scene_file(path, options)?,
         "gltf" | "glb" => gltf_scene(path, options)?,
+        "asc" => database(path, options)?,
         _ => mesh_scene(path, options)?,
     };
     description.source = Some(path.to_path_buf());
@@ -60,6 +63,17 @@ fn gltf_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
     let bytes = unpack::read_file(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     gltf::parse(path, &stem(path), &bytes, &References { folder: Some(folder), allow_outside: options.allow_outside })
+}
+
+fn database(path: &Path, options: &LoadOptions) -> Result<Description> {
+    refuse_set(path, options)?;
+    let bytes = unpack::read_file(path)?;
+    let database = brlcad::parse(path, &bytes)?;
+    let mut description = brlcad::describe::describe(path, &stem(path), &database, &options.brlcad)?;
+    let mut digest = Sha256::new_with_prefix(&bytes);
+    options.brlcad.tops.iter().for_each(|top| digest.update(format!("\0{top}")));
+    description.hash = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
+    Ok(description)
 }
 
 /// Only our own scene files have parameters.

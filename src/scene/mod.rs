@@ -2,6 +2,7 @@
 //! engines trace.
 
 pub mod assembly;
+pub mod brlcad;
 pub mod builtin;
 pub mod description;
 pub mod gltf;

@@ -17,11 +17,13 @@ pub enum Integrator {
     Depth,
     /// Tree nodes visited per primary ray, as a heat map.
     Cost,
+    /// BRL-CAD's `rt`: its shaders and lights, for its databases only.
+    Rt,
 }
 
 impl Integrator {
     /// All integrators.
-    pub const ALL: [Self; 5] = [Self::Whitted, Self::Ao, Self::Normals, Self::Depth, Self::Cost];
+    pub const ALL: [Self; 6] = [Self::Whitted, Self::Ao, Self::Normals, Self::Depth, Self::Cost, Self::Rt];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
@@ -31,6 +33,7 @@ impl Integrator {
             Self::Normals => "normals",
             Self::Depth => "depth",
             Self::Cost => "cost",
+            Self::Rt => "rt",
         }
     }
 }

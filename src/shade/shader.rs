@@ -5,6 +5,8 @@ use glam::DVec3;
 use super::extent::magnitude;
 use super::integrator::Integrator;
 use super::offset::{offset_origin, position_error};
+use super::rt::Rt;
+use crate::camera::Camera;
 use crate::lanes::Real;
 use crate::ray::{Counters, Hits, INVALID_ID, Rays};
 use crate::scene::description::{Description, Light, Material};
@@ -161,6 +163,7 @@ pub struct Shader<'a, S: Real> {
     pub(super) ao_length: f64,
     materials: &'a [Material],
     default_material: Material,
+    rt: Option<Rt>,
 }
 
 impl<'a, S: Real> Shader<'a, S> {
@@ -187,7 +190,15 @@ impl<'a, S: Real> Shader<'a, S> {
             ao_length: if ao_length.is_nan() { f64::INFINITY } else { ao_length },
             materials: &description.materials,
             default_material: Material::default(),
+            rt: None,
         }
+    }
+
+    /// The same with the lighting model of [`Integrator::Rt`], seen by `camera`: of use for BRL-CAD databases only.
+    #[must_use]
+    pub fn with_rt(mut self, description: &Description, camera: &Camera) -> Self {
+        self.rt = description.looks.as_ref().map(|looks| Rt::new(looks, description, camera));
+        self
     }
 
     /// What each ray of the primary batch `rays` sees, into `out` (made as long as the batch). Ray `i` belongs to
@@ -203,6 +214,9 @@ impl<'a, S: Real> Shader<'a, S> {
         out.clear();
         out.resize(rays.len(), Sample::MISS);
         work.rays.primary += rays.live_count() as u64;
+        if let (Integrator::Rt, Some(rt)) = (self.settings.integrator, &self.rt) {
+            return self.rt(rt, rays, work, out);
+        }
         if self.settings.cost {
             self.trace_blocks(rays, work, out);
         } else {
@@ -223,7 +237,8 @@ impl<'a, S: Real> Shader<'a, S> {
             (seen.inst, seen.prim) = (work.hits.inst[i], work.hits.prim[i]);
         }
         match self.settings.integrator {
-            Integrator::Whitted => self.whitted(rays, work, out),
+            // Without regions to look at, `rt`'s model has nothing to say.
+            Integrator::Whitted | Integrator::Rt => self.whitted(rays, work, out),
             Integrator::Ao => self.ambient_occlusion(pixels, sample, work, out),
             Integrator::Normals => super::views::normals(out),
             Integrator::Depth => super::views::depth(out),

@@ -36,7 +36,7 @@ pub use span::{Solid, Span};
 pub use sphere::{Sphere, SphereRecord, WorldSphere};
 pub use taper::{taper, taper_normal};
 pub use torus::{torus, torus_normal};
-pub use triangle::{Degenerate, Triangle, TriangleBlock};
+pub use triangle::{Degenerate, Triangle, TriangleBlock, Turned, around};
 
 #[cfg(test)]
 mod tests;

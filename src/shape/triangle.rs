@@ -19,7 +19,7 @@ use glam::DVec3;
 use super::block::{BLOCK, Block};
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot};
 use crate::math::Aabb;
-use crate::ray::slab::Interval;
+use crate::ray::slab::{Interval, pad};
 use crate::ray::{Candidate, Packet};
 
 /// The triangle kind: nine numbers, three corners' x, y, z.
@@ -81,10 +81,12 @@ impl Triangle {
 
     /// Nearest hits of `N` rays on some triangles of a block, the set bits of `slots`. `found` gets, triangle by triangle, the
     /// candidate (lanes where the line meets the triangle at `t_min <= t`; `u` and `v` are the weights of the second
-    /// and third corner), the lanes it was tested for, and the primitive number.
+    /// and third corner), the lanes it was tested for, and the primitive number. What is farther than `t_max` may be left
+    /// out.
     #[inline(always)]
     pub fn intersect<V: Lanes>(
         packet: &Packet<V>,
+        t_max: V,
         block: &TriangleBlock<V::Scalar>,
         slots: u32,
         active: u32,
@@ -95,9 +97,9 @@ impl Triangle {
             let lanes = packet.dominant[axis] & active;
             if lanes != 0 {
                 match axis {
-                    0 => Self::along::<V, 0>(packet, block, slots, lanes, &mut found),
-                    1 => Self::along::<V, 1>(packet, block, slots, lanes, &mut found),
-                    _ => Self::along::<V, 2>(packet, block, slots, lanes, &mut found),
+                    0 => Self::along::<V, 0>(packet, t_max, block, slots, lanes, &mut found),
+                    1 => Self::along::<V, 1>(packet, t_max, block, slots, lanes, &mut found),
+                    _ => Self::along::<V, 2>(packet, t_max, block, slots, lanes, &mut found),
                 }
             }
         }
@@ -107,6 +109,7 @@ impl Triangle {
     #[inline(always)]
     fn along<V: Lanes, const K: usize>(
         packet: &Packet<V>,
+        t_max: V,
         block: &TriangleBlock<V::Scalar>,
         slots: u32,
         lanes: u32,
@@ -115,22 +118,41 @@ impl Triangle {
         let mut wanted = slots;
         if V::N == 1 {
             // A single ray tests the whole block at once and looks closer where it is not outside.
-            let splat = |v: Lanes3<V>| v.map(|x| <V::Scalar as Real>::Octo::splat(x.lane(0)));
-            let corners = |f: usize| <V::Scalar as Real>::Octo::load(&block.fields[f]);
-            let edges = Edges::new::<K>(splat(packet.org), splat(packet.shear), corners);
-            wanted &= !edges.outside().bits();
+            let ray = packet.single(0);
+            let turned = Turned::of(&ray, K);
+            wanted &= Self::candidates(&turned, ray.t_min, t_max.lane(0), block);
         }
         while wanted != 0 {
             let i = wanted.trailing_zeros() as usize & (BLOCK - 1);
             wanted &= wanted - 1;
             let corners = |f: usize| V::splat(block.fields[f][i]);
-            let edges = Edges::new::<K>(packet.org, packet.shear, corners);
+            let edges = Edges::new(around(packet.org, K), packet.shear, K, corners);
             let maybe = !edges.outside() & V::Mask::from_bits(lanes);
             if maybe.any() {
                 let candidate = Self::accept(packet, &block.get(i), maybe, &edges);
                 found(&candidate, lanes, block.prim[i]);
             }
         }
+    }
+
+    /// Triangles of a block to [`Triangle::look_closer`] at, as bits: those that the ray is not outside of and whose
+    /// corners are neither all beyond `t_max` nor all before `t_min`.
+    #[inline(always)]
+    pub fn candidates<S: Real>(ray: &Turned<S>, t_min: S, t_max: S, block: &TriangleBlock<S>) -> u32 {
+        let rcp = S::Octo::splat(ray.rcp);
+        let corners = |f: usize| S::Octo::load(&block.fields[f]);
+        let edges = Edges::new(ray.org.map(S::Octo::splat), ray.shear.map(S::Octo::splat), ray.axis, corners);
+        // The same slab as that of the triangle's own box, which its parameter is moved into.
+        let [a, b, c] = edges.depth.map(|z| z * rcp);
+        let (near, far) = (a.fast_min(b).fast_min(c), a.fast_max(b).fast_max(c));
+        let aside = S::Octo::splat(t_max).cmp_lt(near) | pad(far).cmp_lt(S::Octo::splat(t_min));
+        !(edges.outside() | aside).bits()
+    }
+
+    /// One ray against one of its [`Triangle::candidates`].
+    #[inline(always)]
+    pub fn look_closer<S: Real>(ray: &Packet<S>, turned: &Turned<S>, numbers: &[S; 9]) -> Candidate<S> {
+        Self::accept(ray, numbers, true, &Edges::new(turned.org, turned.shear, turned.axis, |f| numbers[f]))
     }
 
     /// Depth, weights and segment of lanes that are not outside the triangle.
@@ -151,7 +173,11 @@ impl Triangle {
         if doubtful != 0 {
             found = Self::restart(packet, n, found, doubtful);
         }
-        let end = V::select(interval.far.cmp_eq(V::constant(0.0)) & Self::along_a_face(packet), found.t, interval.far);
+        let zero = V::constant(0.0);
+        let flat = Self::along_a_face(packet);
+        let end = V::select(interval.far.cmp_eq(zero) & flat, found.t, interval.far);
+        let behind = found.t.cmp_lt(zero) & zero.cmp_le(packet.t_min);
+        found.hit = found.hit & !(flat & interval.near.cmp_eq(zero) & behind);
         found.t = packet.t_floor.fast_max(interval.near.fast_max(found.t.fast_min(end)));
         // A parameter that overflowed is no hit: it would tie with the end of an infinite segment.
         let finite = found.t.abs().cmp_le(V::splat(V::Scalar::MAX));
@@ -161,7 +187,7 @@ impl Triangle {
     }
 
     /// Lanes with a direction component of zero. A line in the upper face of a box has its interval end at 0 there
-    /// (`0 * rcp`), which says nothing about where the triangle is.
+    /// (`0 * rcp`), one in the lower face has it begin at 0, and neither says anything about where the triangle is.
     #[inline(always)]
     fn along_a_face<V: Lanes>(packet: &Packet<V>) -> V::Mask {
         let [x, y, z] = packet.dir.map(|d| d.abs().cmp_lt(V::splat(V::Scalar::MIN_POSITIVE)));
@@ -225,26 +251,58 @@ fn unit_normal<S: Real>(n: &[S; 9]) -> [f64; 3] {
     normal.map(|x| x * scale)
 }
 
-/// Edge functions of `N` ray-triangle pairs in the rays' sheared frames.
+/// The components along an axis and the two that follow it.
+#[inline(always)]
+pub fn around<T: Copy>(v: [T; 3], axis: usize) -> [T; 3] {
+    AROUND[axis & 3].map(|a| v[a])
+}
+
+/// Each axis with the two that follow it; the last row fills up to a power of two.
+const AROUND: [[usize; 3]; 4] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 1, 2]];
+
+/// What the test of one ray needs, the components along its dominant axis first, then along the two that follow it.
+#[derive(Clone, Copy, Debug)]
+pub struct Turned<S> {
+    /// The dominant axis.
+    pub axis: usize,
+    /// Origin, turned.
+    pub org: [S; 3],
+    /// See [`Packet::shear`].
+    pub shear: [S; 3],
+    /// Reciprocal of the direction along the dominant axis.
+    pub rcp: S,
+}
+
+impl<S: Real> Turned<S> {
+    /// `ray` around its dominant axis.
+    #[inline(always)]
+    pub fn of(ray: &Packet<S>, axis: usize) -> Self {
+        Self { axis, org: around(ray.org, axis), shear: ray.shear, rcp: ray.rcp[axis] }
+    }
+}
+
+/// Edge functions of `N` ray-triangle pairs in the rays' sheared frames, and the corners' distances along the dominant
+/// axis.
 struct Edges<V> {
+    depth: [V; 3],
     u: V,
     v: V,
     w: V,
 }
 
 impl<V: Lanes> Edges<V> {
-    /// For rays with dominant axis `K`; `corner(f)` gives field `f` of the triangles.
+    /// For rays with this dominant axis, their origins [`around`] it; `corner(f)` gives field `f` of the triangles.
     #[inline(always)]
-    fn new<const K: usize>(org: Lanes3<V>, shear: Lanes3<V>, corner: impl Fn(usize) -> V) -> Self {
-        let (kx, ky) = ((K + 1) % 3, (K + 2) % 3);
+    fn new(org: Lanes3<V>, shear: Lanes3<V>, axis: usize, corner: impl Fn(usize) -> V) -> Self {
+        let [k, kx, ky] = AROUND[axis & 3];
         let sheared = |i: usize| {
-            let z = corner(3 * i + K) - org[K];
-            let x = shear[0].mul_add(z, corner(3 * i + kx) - org[kx]);
-            let y = shear[1].mul_add(z, corner(3 * i + ky) - org[ky]);
-            (x, y)
+            let z = corner(3 * i + k) - org[0];
+            let x = shear[0].mul_add(z, corner(3 * i + kx) - org[1]);
+            let y = shear[1].mul_add(z, corner(3 * i + ky) - org[2]);
+            (x, y, z)
         };
-        let ((ax, ay), (bx, by), (cx, cy)) = (sheared(0), sheared(1), sheared(2));
-        Self { u: cx * by - cy * bx, v: ax * cy - ay * cx, w: bx * ay - by * ax }
+        let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (sheared(0), sheared(1), sheared(2));
+        Self { depth: [az, bz, cz], u: cx * by - cy * bx, v: ax * cy - ay * cx, w: bx * ay - by * ax }
     }
 
     /// Pairs with edge functions of both signs. A NaN (overflow) is never outside: the restart decides.

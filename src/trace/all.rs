@@ -34,7 +34,7 @@ where
     V::Scalar: Engines,
 {
     let mut list = Vec::new();
-    let solids = &mut V::Scalar::stack(scratch).solids;
+    let solids = &mut V::Scalar::memory(scratch).stack.solids;
     for first in (0..rays.len()).step_by(V::N) {
         let (packet, t_max, live) = Packet::<V>::load(rays, first);
         let start = list.len();

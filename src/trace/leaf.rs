@@ -29,7 +29,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
     match Class::ALL[usize::from(leaf.class)] {
         Class::Triangle => {
             let block = &object.triangles[at];
-            Triangle::intersect(packet, block, (1 << count) - 1, lanes, |found, lanes, prim| {
+            Triangle::intersect(packet, query.hit.t, block, (1 << count) - 1, lanes, |found, lanes, prim| {
                 query.take(lanes, found, prim, inst)
             });
         }

@@ -8,9 +8,11 @@ mod all;
 mod brute;
 mod bundle;
 mod leaf;
+mod output;
 mod query;
 mod single;
 mod solids;
+mod stream;
 mod tile;
 mod traverse;
 
@@ -26,9 +28,22 @@ use query::{Query, Stack};
 /// Per-thread working memory of engines; grows on use, reusable for any world.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    single: Stack<f32>,
-    double: Stack<f64>,
+    single: Memory<f32>,
+    double: Memory<f64>,
     tile: Box<tile::Memory>,
+}
+
+/// Working memory of the generic engines of one precision.
+#[derive(Debug)]
+pub struct Memory<S> {
+    stack: Stack<S>,
+    stream: Box<stream::Memory<S>>,
+}
+
+impl<S: Real> Default for Memory<S> {
+    fn default() -> Self {
+        Self { stack: Stack::default(), stream: Box::default() }
+    }
 }
 
 /// A complete path from rays to hits.
@@ -70,7 +85,7 @@ pub trait Engines: Real {
     /// All engines of this precision, baselines first.
     fn engines() -> &'static [&'static dyn Engine<Self>];
     #[doc(hidden)]
-    fn stack(scratch: &mut Scratch) -> &mut Stack<Self>;
+    fn memory(scratch: &mut Scratch) -> &mut Memory<Self>;
 }
 
 impl Engines for f32 {
@@ -83,12 +98,13 @@ impl Engines for f32 {
             &Generic::<f32x4, true>("packet4", PhantomData),
             &Generic::<f32x8, true>("packet8", PhantomData),
             &Generic::<f32x16, true>("packet16", PhantomData),
+            &stream::Stream::<f32x16>(PhantomData),
             &tile::Tile::<true>,
             &tile::Tile::<false>,
         ]
     }
 
-    fn stack(scratch: &mut Scratch) -> &mut Stack<Self> {
+    fn memory(scratch: &mut Scratch) -> &mut Memory<Self> {
         &mut scratch.single
     }
 }
@@ -104,10 +120,11 @@ impl Engines for f64 {
             &Generic::<f64x4, true>("packet4", PhantomData),
             &Generic::<f64x8, true>("packet8", PhantomData),
             &Generic::<Pair<f64x8>, true>("packet16", PhantomData),
+            &stream::Stream::<f64x8>(PhantomData),
         ]
     }
 
-    fn stack(scratch: &mut Scratch) -> &mut Stack<Self> {
+    fn memory(scratch: &mut Scratch) -> &mut Memory<Self> {
         &mut scratch.double
     }
 }
@@ -215,7 +232,7 @@ where
         counters: Option<&mut Counters>,
     ) {
         hits.reset(rays.len());
-        let stack = V::Scalar::stack(scratch);
+        let stack = &mut V::Scalar::memory(scratch).stack;
         stack.reserve(world.stack_bound());
         match counters {
             Some(counters) => Self::closest::<true>(world, rays, hits, stack, counters),
@@ -233,7 +250,7 @@ where
     ) {
         out.clear();
         out.resize(rays.len(), 0);
-        let stack = V::Scalar::stack(scratch);
+        let stack = &mut V::Scalar::memory(scratch).stack;
         stack.reserve(world.stack_bound());
         match counters {
             Some(counters) => Self::any::<true>(world, rays, out, stack, counters),

@@ -14,6 +14,7 @@
 
 mod arrays;
 mod header;
+mod kind;
 mod literal;
 mod planes;
 
@@ -21,7 +22,8 @@ pub use arrays::{
     parse_hits, parse_occlusion, parse_rays, read_hits, read_occlusion, read_rays, write_hits, write_occlusion,
     write_rays, write_stretches,
 };
-pub use planes::{parse_plane, read_plane, write_plane, write_stack};
+pub use kind::{Kind, kind};
+pub use planes::{parse_film, parse_plane, read_film, read_plane, write_plane, write_stack};
 
 #[cfg(test)]
 mod tests;

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::arrays::{each_record, open, u32_at};
 use super::header::{self, Descr, Header};
 use crate::error::{Error, Result};
-use crate::film::{PlaneData, write_atomically};
+use crate::film::{Film, PlaneData, write_atomically};
 
 /// Reads a 2-D array of `<f4` or `<u4` as (width, height, samples).
 ///
@@ -27,14 +27,19 @@ pub fn parse_plane(file: &Path, bytes: &[u8]) -> Result<(u32, u32, PlaneData)> {
 
 fn plane(file: &Path, mut reader: impl Read, len: u64) -> Result<(u32, u32, PlaneData)> {
     let header = Header::read(file, &mut reader, len)?;
+    let axis = |i: usize| header.shape.get(i).and_then(|&n| u32::try_from(n).ok());
+    let (2, Some(height), Some(width)) = (header.shape.len(), axis(0), axis(1)) else {
+        return Err(header.wrong_shape(file, "(height, width), each below 2^32"));
+    };
+    Ok((width, height, samples(file, reader, &header, len)?))
+}
+
+/// The numbers of an array of `<f4` or `<u4`, in C order.
+fn samples(file: &Path, reader: impl Read, header: &Header, len: u64) -> Result<PlaneData> {
     let is_float = match &header.descr {
         Descr::Plain(format) if format == "<f4" => true,
         Descr::Plain(format) if format == "<u4" => false,
         _ => return Err(header.wrong_descr(file, "'<f4' or '<u4': a plane")),
-    };
-    let axis = |i: usize| header.shape.get(i).and_then(|&n| u32::try_from(n).ok());
-    let (2, Some(height), Some(width)) = (header.shape.len(), axis(0), axis(1)) else {
-        return Err(header.wrong_shape(file, "(height, width), each below 2^32"));
     };
     header.require_c_order(file)?;
     let count = header.count(file, 4, len)?;
@@ -43,9 +48,54 @@ fn plane(file: &Path, mut reader: impl Read, len: u64) -> Result<(u32, u32, Plan
         bits.push(u32_at(record, 0));
         Ok(())
     })?;
-    let data =
-        if is_float { PlaneData::F32(bits.into_iter().map(f32::from_bits).collect()) } else { PlaneData::U32(bits) };
-    Ok((width, height, data))
+    Ok(if is_float { PlaneData::F32(bits.into_iter().map(f32::from_bits).collect()) } else { PlaneData::U32(bits) })
+}
+
+/// Most planes in one array.
+const MAX_PLANES: u64 = 256;
+
+/// Reads a 2-D array of `<f4` or `<u4` as a film of the plane `Y`, or a 3-D one, whose last axis is planes, as `R G B` (three),
+/// `R G B A` (four) or `0 1 2 ...`.
+///
+/// # Errors
+/// As [`read_plane`].
+pub fn read_film(path: &Path) -> Result<Film> {
+    let (reader, len) = open(path)?;
+    film(path, reader, len)
+}
+
+/// [`read_film`] of bytes in memory; `file` is only for messages.
+///
+/// # Errors
+/// As [`read_plane`].
+pub fn parse_film(file: &Path, bytes: &[u8]) -> Result<Film> {
+    film(file, bytes, bytes.len() as u64)
+}
+
+fn film(file: &Path, mut reader: impl Read, len: u64) -> Result<Film> {
+    let header = Header::read(file, &mut reader, len)?;
+    let axis = |i: usize| header.shape.get(i).and_then(|&n| u32::try_from(n).ok());
+    let (height, width, planes) = match (header.shape.len(), axis(0), axis(1), header.shape.get(2)) {
+        (2, Some(height), Some(width), None) => (height, width, 1),
+        (3, Some(height), Some(width), Some(&planes)) if (1..=MAX_PLANES).contains(&planes) => (height, width, planes),
+        _ => return Err(header.wrong_shape(file, "(height, width) or (height, width, planes), at most 256 planes")),
+    };
+    let mut film = Film::full(width, height).map_err(|_| header.wrong_shape(file, "at least one pixel"))?;
+    let data = samples(file, reader, &header, len)?;
+    let names: Vec<String> = match planes {
+        1 => vec!["Y".into()],
+        3 | 4 => ["R", "G", "B", "A"].iter().take(planes as usize).map(|&name| name.into()).collect(),
+        _ => (0..planes).map(|i| i.to_string()).collect(),
+    };
+    for (i, name) in names.into_iter().enumerate() {
+        let step = planes as usize;
+        let plane = match &data {
+            PlaneData::F32(v) => PlaneData::F32(v.iter().skip(i).step_by(step).copied().collect()),
+            PlaneData::U32(v) => PlaneData::U32(v.iter().skip(i).step_by(step).copied().collect()),
+        };
+        film.push(name, plane)?;
+    }
+    Ok(film)
 }
 
 /// Writes several float planes as one array of shape (height, width, planes).

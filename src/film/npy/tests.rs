@@ -217,3 +217,23 @@ fn mutated_files_never_panic() {
     // The loop must reach beyond the header to mean anything.
     assert!((1000..39_000).contains(&accepted), "{accepted}");
 }
+
+#[test]
+fn a_third_axis_is_planes() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("stack.npy");
+    write_stack(&path, 2, 1, &[&[1.0, 2.0], &[3.0, 4.0], &[5.0, 6.0]]).unwrap();
+    let film = read_film(&path).unwrap();
+    assert_eq!((film.width, film.height, film.planes.len()), (2, 1, 3));
+    assert_eq!((film.f32_plane("R").unwrap(), film.f32_plane("B").unwrap()), (&[1.0, 2.0][..], &[5.0, 6.0][..]));
+    write_stack(&path, 1, 1, &[&[1.0], &[2.0]]).unwrap();
+    assert_eq!(read_film(&path).unwrap().f32_plane("1").unwrap(), [2.0]);
+    write_plane(&path, 1, 2, &PlaneData::U32(vec![7, 8])).unwrap();
+    assert_eq!(read_film(&path).unwrap().u32_plane("Y").unwrap(), [7, 8]);
+    assert_eq!(kind(&path).unwrap(), Kind::Numbers);
+    let rays = write_rays(&path, [Rays::<f32>::new(3)]).and_then(|_| read_film(&path)).unwrap();
+    assert_eq!((rays.width, rays.height), (8, 3), "rays are numbers, too");
+    write_occlusion(&path, [[1, 0]]).unwrap();
+    assert!(read_film(&path).unwrap_err().to_string().contains("(height, width)"));
+    assert_eq!(kind(&path).unwrap(), Kind::Occlusion);
+}

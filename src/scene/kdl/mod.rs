@@ -18,8 +18,8 @@ mod scope;
 mod settings;
 mod shapes;
 mod solids;
-mod source;
-mod syntax;
+pub(crate) mod source;
+pub(crate) mod syntax;
 mod terrain;
 #[cfg(test)]
 mod tests;

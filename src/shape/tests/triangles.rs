@@ -14,8 +14,8 @@ type Found = ([u64; 3], u32);
 fn traced<V: Lanes>(rays: &[Ray], block: &Block<V::Scalar, 9>, count: usize, active: u32, t_max: f64) -> Vec<Found> {
     let packet = packet::<V>(rays);
     let mut hits = HitPacket::new(V::constant(t_max));
-    Triangle::intersect(&packet, block, (1 << count) - 1, active, |found, lanes, prim| {
-        hits.commit(lanes, found, prim, 3)
+    Triangle::intersect(&packet, hits.t, block, (1 << count) - 1, active, |found, lanes, prim| {
+        hits.commit(lanes, found, prim, 3);
     });
     (0..V::N).map(|i| ([hits.t, hits.u, hits.v].map(|x| x.lane(i).to_f64().to_bits()), hits.prim[i])).collect()
 }
@@ -277,7 +277,8 @@ fn blocks_give_back_what_was_put_in() {
 }
 
 /// A ray from inside the triangle's box, in its upper face x = 1, to the edge from (1, 2, 2) to (1, -2, -1) at
-/// (1, -1, -0.25): 3 units of t away, not 0, where `0 * rcp` lets the box end.
+/// (1, -1, -0.25): 3 units of t away, not 0, where `0 * rcp` lets the box end. Seen the other way the triangle lies
+/// behind the ray; in the lower face `0 * rcp` lets the box begin at 0.
 #[test]
 fn a_ray_in_a_face_of_the_box_gets_its_own_t() {
     fn check<S: Real>() {
@@ -287,6 +288,8 @@ fn a_ray_in_a_face_of_the_box_gets_its_own_t() {
             near(hit::<S>(ray, &record(corners)), [3.0, 0.0, 0.75], 1e-6);
             let mirrored = |p: DVec3| DVec3::new(-p.x, p.y, p.z);
             near(hit::<S>((mirrored(ray.0), ray.1), &record(corners.map(mirrored))), [3.0, 0.0, 0.75], 1e-6);
+            assert_eq!(hit::<S>((ray.0, -ray.1), &record(corners)), None);
+            assert_eq!(hit::<S>((mirrored(ray.0), -ray.1), &record(corners.map(mirrored))), None);
         }
     }
     check::<f32>();

@@ -38,7 +38,7 @@ impl Exact<'_> {
     #[inline(always)]
     fn meet(&self, packet: &Packet<V>, slot: u32, lanes: u32, mut found: impl FnMut(&Candidate<V>, u32, u32)) {
         let block = &self.object.triangles[(slot >> 3) as usize];
-        Triangle::intersect(packet, block, 1 << (slot & 7), lanes, &mut found);
+        Triangle::intersect(packet, V::splat(f32::INFINITY), block, 1 << (slot & 7), lanes, &mut found);
     }
 
     /// The final hits of a group: what the common formula says of its winners.

@@ -4,8 +4,8 @@
 //! triangles are set up once per tile, and a ray's share of a triangle test is four linear functions of its two
 //! coordinates. `tile` answers with that arithmetic ([`own`]; [`batch`] states its accuracy). In `tile-exact` the common
 //! formula decides where rounding could matter, so its hits are those of the other engines, bit by bit ([`exact`]).
-//! Blocks of rays without a common point, worlds with more than one mesh object and single odd rays go to the packet
-//! kernel.
+//! Blocks of rays without a common point and worlds with more than one mesh object go to the stream kernel
+//! ([`super::stream`]), single odd rays to the packet kernel.
 //!
 //! Sources: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm", 2005; Wald, Boulos, Shirley, "Ray tracing
 //! deformable scenes using dynamic bounding volume hierarchies", 2007; Fuetterling, Lojewski, Pfreundt, Ebert,
@@ -22,8 +22,9 @@ mod pairs;
 mod slab;
 mod walk;
 
+use super::output::Output;
 use super::query::{Query, Stack};
-use super::{Engine, Generic, Scratch, traverse};
+use super::{Engine, Generic, Scratch, stream, traverse};
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::{Class, Object, World};
@@ -60,17 +61,13 @@ pub struct Memory {
     pairs: pairs::Pairs,
     slabs: slab::Slabs,
     levels: Vec<node::Level>,
+    /// Where groups start that are for the stream kernel.
+    rest: Vec<usize>,
 }
 
 /// The engine; `EXACT`: with the hits of the common formula.
 #[derive(Clone, Copy, Debug)]
 pub struct Tile<const EXACT: bool>;
-
-/// Where answers go.
-enum Output<'a> {
-    Closest(&'a mut Hits<f32>),
-    Any(&'a mut [u8]),
-}
 
 /// One call of the engine.
 struct Job<'a> {
@@ -78,8 +75,9 @@ struct Job<'a> {
     rays: &'a Rays<f32>,
     memory: &'a mut Memory,
     stack: &'a mut Stack<f32>,
+    stream: &'a mut stream::Memory<f32>,
     counters: &'a mut Counters,
-    output: Output<'a>,
+    output: Output<'a, f32>,
 }
 
 /// The object of a world that tiles can trace: one object in world space, of triangles only.
@@ -111,9 +109,18 @@ impl Job<'_> {
             let bundle = object.and_then(|object| Some((object, Bundle::find(self.rays, first, ANY)?)));
             match bundle {
                 Some((object, bundle)) => self.block::<ANY, EXACT, COUNT>(object, &bundle),
-                None => (0..bundle::groups(self.rays, first)).for_each(|g| self.packet::<ANY, COUNT>(first + g * V::N)),
+                None => self.memory.rest.extend((0..bundle::groups(self.rays, first)).map(|g| first + g * V::N)),
             }
         }
+        if self.memory.rest.is_empty() {
+            return;
+        }
+        let starts = std::mem::take(&mut self.memory.rest);
+        let Self { world, rays, stream: memory, stack, counters, output, .. } = self;
+        let mut job = stream::Job { world, rays, memory, stack, counters, output: output.reborrow() };
+        job.run::<V, ANY, COUNT>(starts.iter().copied());
+        self.memory.rest = starts;
+        self.memory.rest.clear();
     }
 
     /// Traces a block as one tile, or as four or sixteen where its rays spread too wide, or as packets.
@@ -172,7 +179,7 @@ impl Job<'_> {
             if odd != 0 {
                 done |= self.rest::<ANY, COUNT>(first, odd, None).1;
             }
-            self.put_any(first, done);
+            self.output.put_any(first, V::N, done);
             return;
         }
         if !EXACT && odd == 0 {
@@ -197,14 +204,6 @@ impl Job<'_> {
         }
     }
 
-    fn put_any(&mut self, first: usize, done: u32) {
-        if let Output::Any(out) = &mut self.output {
-            for (lane, out) in out[first..].iter_mut().take(V::N).enumerate() {
-                *out = (done >> lane & 1) as u8;
-            }
-        }
-    }
-
     /// The packet kernel for some lanes, on top of hits that other lanes have.
     #[cold]
     #[inline(never)]
@@ -225,10 +224,7 @@ impl Job<'_> {
     fn packet<const ANY: bool, const COUNT: bool>(&mut self, first: usize) {
         let (hit, done) =
             Generic::<V, true>::packet::<ANY, COUNT>(self.world, self.rays, first, self.stack, self.counters);
-        match &mut self.output {
-            Output::Closest(hits) => hit.store(hits, first),
-            Output::Any(_) => self.put_any(first, done),
-        }
+        self.output.put(first, &hit, done);
     }
 }
 
@@ -274,17 +270,17 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
 fn call<const ANY: bool, const EXACT: bool>(
     world: &World<f32>,
     rays: &Rays<f32>,
-    output: Output,
+    output: Output<f32>,
     scratch: &mut Scratch,
     counters: Option<&mut Counters>,
 ) {
-    let Scratch { single: stack, tile: memory, .. } = scratch;
+    let Scratch { single: super::Memory { stack, stream }, tile: memory, .. } = scratch;
     stack.reserve(world.stack_bound());
     match counters {
-        Some(counters) => Job { world, rays, memory, stack, counters, output }.run::<ANY, EXACT, true>(),
+        Some(counters) => Job { world, rays, memory, stack, stream, counters, output }.run::<ANY, EXACT, true>(),
         None => {
             let counters = &mut Counters::default();
-            Job { world, rays, memory, stack, counters, output }.run::<ANY, EXACT, false>();
+            Job { world, rays, memory, stack, stream, counters, output }.run::<ANY, EXACT, false>();
         }
     }
 }

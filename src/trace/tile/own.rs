@@ -159,7 +159,7 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, cor
     block.set(0, corners, prim);
     let one = V::constant(1.0);
     let mut any = false;
-    Triangle::intersect(&packet, &block, 1, exact.bundle.tame[g], |found, lanes, _| {
+    Triangle::intersect(&packet, t_max, &block, 1, exact.bundle.tame[g], |found, lanes, _| {
         let hit = found.hit & found.t.cmp_le(t_max) & Mask::from_bits(lanes);
         if ANY {
             any |= occlude(groups, g, hit);

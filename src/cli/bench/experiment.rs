@@ -1,0 +1,178 @@
+//! `bench --experiment`: every case of a file, one step after the other; what is finished is never measured again.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use super::{write, write_whole};
+use crate::camera::framing;
+use crate::cli::interrupt::stopped;
+use crate::cli::output::OutputArgs;
+use crate::error::{Error, Result};
+use crate::measure::bench::{self, Plan};
+use crate::measure::env;
+use crate::measure::experiment::{Case, Experiment, parse};
+use crate::measure::peers::Invitation;
+use crate::measure::raysets::RayKind;
+use crate::measure::rows::{Outcome, Row, Run};
+use crate::measure::timing::Workers;
+use crate::scene::description::{CameraDescription, Description, Precision};
+use crate::scene::load::{LoadOptions, load};
+use crate::scene::world::Preset;
+use crate::trace::Engines;
+
+/// Runs the experiment in `file` into `folder` (default: one called after it); returns the folder.
+///
+/// # Errors
+/// A file that is no experiment; a folder of another one; scenes that cannot be opened; [`Error::Mismatch`] if an engine is
+/// wrong; [`Error::Interrupted`] (then, and after a kill, the same command goes on where it was).
+pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &OutputArgs) -> Result<PathBuf> {
+    let text = std::fs::read(file).map_err(|e| Error::io(file, e))?;
+    let experiment = parse(file, &text)?;
+    let folder = folder.map_or_else(|| PathBuf::from(format!("experiment-{}", experiment.name)), Path::to_path_buf);
+    claim(&folder, &text)?;
+    output.say(&format!("{}: {}", experiment.name, experiment.question));
+    let steps = experiment.cases.len() * experiment.rays.len();
+    let done = |case: &Case, class: &RayKind| place(&folder, case, *class).join("bench.csv").exists();
+    let finished =
+        experiment.cases.iter().map(|c| experiment.rays.iter().filter(|k| done(c, k)).count()).sum::<usize>();
+    if finished > 0 {
+        output.say(&format!("{finished} of {steps} steps are finished already"));
+    }
+    let bar = output.progress_bar(steps as u64, "measuring");
+    bar.inc(finished as u64);
+    // The bar's estimate must not count what an earlier run did.
+    bar.reset_eta();
+    let begun = Instant::now();
+    let (mut measured, mut wrong) = (0, 0);
+    for case in &experiment.cases {
+        let left: Vec<RayKind> = experiment.rays.iter().copied().filter(|kind| !done(case, kind)).collect();
+        if left.is_empty() {
+            continue;
+        }
+        let mut step = |rows: &[Row], class: RayKind| -> Result<()> {
+            let run = Run { command: case.command(class), ..Run::now(case.threads as usize) };
+            write(&place(&folder, case, class), &run, rows, &env::facts(case.threads as usize))?;
+            wrong += rows.iter().filter(|row| matches!(row.outcome, Outcome::Wrong(_))).count();
+            measured += 1;
+            bar.inc(1);
+            if measured == 1 {
+                let (rest, first) = ((steps - finished - 1) as u32, begun.elapsed());
+                output.say(&format!(
+                    "the first step took {}; {rest} to go, about {}",
+                    seconds(first),
+                    seconds(rest * first)
+                ));
+            }
+            Ok(())
+        };
+        let result = measure(&experiment, case, file, &left, embree, &mut step);
+        if result.is_err() {
+            bar.finish_and_clear();
+            return result.map(|()| folder);
+        }
+    }
+    bar.finish_and_clear();
+    output.say(&format!("{measured} steps in {}; now: lanecast report {}", seconds(begun.elapsed()), folder.display()));
+    if wrong > 0 {
+        return Err(Error::Mismatch(format!("bench: {wrong} rows have wrong hits")));
+    }
+    Ok(folder)
+}
+
+fn seconds(time: Duration) -> String {
+    format!("{:.1} s", time.as_secs_f64())
+}
+
+/// The folder of one step.
+fn place(folder: &Path, case: &Case, class: RayKind) -> PathBuf {
+    folder.join(case.label()).join(class.name())
+}
+
+/// Makes sure that `folder` is new or holds this very experiment.
+fn claim(folder: &Path, text: &[u8]) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
+    let copy = folder.join("experiment.kdl");
+    match std::fs::read(&copy) {
+        Ok(old) if old == text => Ok(()),
+        Ok(_) => {
+            Err(Error::Usage(format!("{} holds another experiment; give another folder with -o", folder.display())))
+        }
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => write_whole(&copy, text),
+        Err(e) => Err(Error::io(copy, e)),
+    }
+}
+
+type Step<'a> = dyn FnMut(&[Row], RayKind) -> Result<()> + 'a;
+
+fn measure(
+    experiment: &Experiment,
+    case: &Case,
+    file: &Path,
+    kinds: &[RayKind],
+    embree: Option<&Path>,
+    step: &mut Step<'_>,
+) -> Result<()> {
+    let beside = file.parent().unwrap_or(Path::new("")).join(&case.scene);
+    let scene = if beside.is_file() { beside.to_string_lossy().into_owned() } else { case.scene.clone() };
+    let description = load(&scene, &LoadOptions { set: case.set.clone(), ..Default::default() })?;
+    let workers = Workers::new(case.threads as usize)?.flushing(!case.peers.is_empty());
+    let plan = Plan {
+        kinds: kinds.to_vec(),
+        engines: case.engines.clone(),
+        size: case.size,
+        repeat: case.repeat,
+        seed: case.seed,
+        preset: match case.preset.as_str() {
+            "fast" => Preset::Fast,
+            "best" => Preset::Best,
+            _ => Preset::Balanced,
+        },
+        peers: Invitation { names: case.peers.clone(), embree: embree.map(Path::to_path_buf) },
+    };
+    let f64_asked = match case.precision.as_str() {
+        "" => description.precision == Some(Precision::F64),
+        word => word == "f64",
+    };
+    let rows = Steps { experiment, pending: Vec::new(), step, failed: None };
+    if f64_asked {
+        one::<f64>(&workers, &description, &plan, rows)
+    } else {
+        one::<f32>(&workers, &description, &plan, rows)
+    }
+}
+
+/// Rows of the class that is being measured; a class is finished when the next begins.
+struct Steps<'a, 's> {
+    experiment: &'a Experiment,
+    pending: Vec<Row>,
+    step: &'a mut Step<'s>,
+    failed: Option<Error>,
+}
+
+impl Steps<'_, '_> {
+    fn add(&mut self, row: Row) {
+        if self.pending.first().is_some_and(|first| first.class != row.class) {
+            self.flush();
+        }
+        self.pending.push(row);
+    }
+
+    fn flush(&mut self) {
+        let rows = std::mem::take(&mut self.pending);
+        let class = rows.first().and_then(|row| self.experiment.rays.iter().find(|kind| kind.name() == row.class));
+        if let (Some(&class), None) = (class, &self.failed) {
+            self.failed = (self.step)(&rows, class).err();
+        }
+    }
+}
+
+fn one<S: Engines>(workers: &Workers, description: &Description, plan: &Plan, mut rows: Steps<'_, '_>) -> Result<()> {
+    let camera = |bounds| -> Result<CameraDescription> {
+        let aspect = f64::from(plan.size.0) / f64::from(plan.size.1);
+        Ok(description.cameras.first().cloned().unwrap_or_else(|| framing(bounds, aspect)))
+    };
+    let result = bench::scene::<S>(workers, description, &camera, plan, &stopped, &mut |row| rows.add(row));
+    // All rows of a class are reported at once when it is done, so what is pending is whole.
+    rows.flush();
+    rows.failed.map_or(result, Err)
+}

@@ -1,0 +1,317 @@
+//! `lanecast compare`: two pictures, or two files of hits.
+
+mod table;
+
+use std::path::{Path, PathBuf};
+
+use super::common::{OutputArgs, SceneOptions, ThreadArgs, with_pool};
+use super::output::{json_to_stdout, to_stdout};
+use crate::error::{Error, Result};
+use crate::film::exr::{Compression, ImageInfo};
+use crate::film::metrics::Viewing;
+use crate::film::picture::{self, Picture};
+use crate::film::{exr, heat, npy};
+use crate::measure::env::REVISION;
+use crate::measure::hitfiles::{self, FileAnswers, HitReport};
+use crate::measure::pictures::{self, Maps, Options, PictureReport};
+
+const EXAMPLES: &str = "\
+Examples:
+  lanecast compare reference.exr render.exr
+  lanecast compare old.png new.png -o heat.png --max-rmse 0.001
+  lanecast compare a.exr b.exr -o difference.exr -o flip.png --map hdr-flip --json
+  lanecast compare scalar.npy tile.npy --scene model.ply --rays rays.npy
+
+Pictures: .exr (any channels), .png, .pfm, .npy (height, width[, channels]); A is the reference. Figures of the
+colours are of display values (0 to 1) if a file holds 8-bit levels, else of linear light. Classes count samples
+that are the same, one step apart, or farther; steps are 8-bit levels, or representable floats (ulp).
+Hits: files that `trace --hits` wrote. With --scene and --rays, the f64 oracle judges both answers of every ray
+whose bits differ; a mismatch is explained if the geometry is within a few roundings of the answer.
+Exit code 1: a limit given here is passed, a mismatch of hits is not explained, or sizes differ.";
+
+/// Arguments of `lanecast compare`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct CompareArgs {
+    /// The reference
+    a: PathBuf,
+    /// What is compared with it
+    b: PathBuf,
+    /// Write where pictures differ: FILE.exr (signed differences and maps as planes) or FILE.png (a heat map)
+    #[arg(short = 'o', long = "output", value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// What the heat map shows
+    #[arg(long, value_enum, default_value_t = Map::Flip)]
+    map: Map,
+    /// Value of the heat map's brightest colour [default: 1 for flip and hdr-flip, else the 99.9th percentile]
+    #[arg(long, value_name = "X", value_parser = positive)]
+    full: Option<f32>,
+    /// Stops by which linear light is brightened for 8-bit levels and LDR-FLIP
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true, value_parser = finite)]
+    exposure: f32,
+    /// White of PSNR and SSIM [default: 1 for levels, else the largest value of the reference]
+    #[arg(long, value_name = "X", value_parser = positive)]
+    peak: Option<f32>,
+    /// Pixels per degree of the visual field, for FLIP [default: 67]
+    #[arg(long, value_name = "N", value_parser = density)]
+    ppd: Option<f64>,
+    #[command(flatten)]
+    limits: Limits,
+    /// Scene that the hits are of
+    #[arg(long, value_name = "SCENE", requires = "rays", help_heading = "Hits")]
+    scene: Option<String>,
+    /// Rays that the hits are of
+    #[arg(long, value_name = "FILE.npy", requires = "scene", help_heading = "Hits")]
+    rays: Option<PathBuf>,
+    #[command(flatten)]
+    options: SceneOptions,
+    #[command(flatten)]
+    threads: ThreadArgs,
+    #[command(flatten)]
+    pub(super) output: OutputArgs,
+}
+
+/// Limits for scripts.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Limits (exit code 1 beyond them)")]
+struct Limits {
+    /// Largest root mean squared error
+    #[arg(long, value_name = "X")]
+    max_rmse: Option<f64>,
+    /// Largest mean relative squared error
+    #[arg(long, value_name = "X")]
+    max_relmse: Option<f64>,
+    /// Smallest PSNR, decibels
+    #[arg(long, value_name = "DB")]
+    min_psnr: Option<f64>,
+    /// Smallest SSIM
+    #[arg(long, value_name = "X")]
+    min_ssim: Option<f64>,
+    /// Largest mean LDR-FLIP
+    #[arg(long, value_name = "X")]
+    max_flip: Option<f64>,
+    /// Largest mean HDR-FLIP
+    #[arg(long, value_name = "X")]
+    max_hdr_flip: Option<f64>,
+    /// Largest distance in units in the last place
+    #[arg(long, value_name = "N")]
+    max_ulp: Option<u64>,
+    /// Most samples (of hits: rays) that are neither the same nor one step apart
+    #[arg(long, value_name = "N")]
+    max_beyond: Option<u64>,
+    /// Most samples (of hits: rays) that are not the same
+    #[arg(long, value_name = "N")]
+    max_different: Option<u64>,
+}
+
+/// Values of `--map`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Map {
+    /// LDR-FLIP
+    Flip,
+    /// HDR-FLIP
+    HdrFlip,
+    /// Largest absolute error of the colours
+    Error,
+    /// Distance in 8-bit levels
+    Levels,
+}
+
+/// The object of `--json`.
+#[derive(serde::Serialize)]
+struct Report<'a> {
+    a: &'a Path,
+    b: &'a Path,
+    pass: bool,
+    failures: Vec<String>,
+    #[serde(flatten)]
+    found: Found<'a>,
+}
+
+#[derive(serde::Serialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+enum Found<'a> {
+    Pictures(&'a PictureReport),
+    Hits(&'a HitReport),
+}
+
+/// Runs `lanecast compare`.
+///
+/// # Errors
+/// Bad input; [`Error::Mismatch`] beyond a limit.
+pub fn run(args: &CompareArgs) -> Result<()> {
+    with_pool(args.threads.count(), || match (answers(&args.a)?, answers(&args.b)?) {
+        (Some(a), Some(b)) => hits(args, &a, &b),
+        (None, None) => images(args),
+        _ => Err(Error::Usage("one file holds hits, the other a picture".into())),
+    })
+}
+
+/// The answers in `path` if it is a hit file.
+fn answers(path: &Path) -> Result<Option<FileAnswers>> {
+    let is_array = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
+    if is_array { hitfiles::read(path) } else { Ok(None) }
+}
+
+fn images(args: &CompareArgs) -> Result<()> {
+    if args.scene.is_some() {
+        return Err(Error::Usage("--scene and --rays are for files of hits".into()));
+    }
+    let (a, b) = (picture::read(&args.a)?, picture::read(&args.b)?);
+    let viewing = args.ppd.map_or_else(Viewing::default, |pixels_per_degree| Viewing { pixels_per_degree });
+    let options = Options { exposure: args.exposure, peak: args.peak.map(f64::from), viewing };
+    let (report, maps) = pictures::compare(&a, &b, &options)?;
+    args.files.iter().try_for_each(|path| write(args, path, (&a, &b), maps.as_ref()))?;
+    let failures = args.limits.of_pictures(&report)?;
+    finish(args, Found::Pictures(&report), failures, || table::pictures(&report))
+}
+
+fn hits(args: &CompareArgs, a: &FileAnswers, b: &FileAnswers) -> Result<()> {
+    if !args.files.is_empty() {
+        return Err(Error::Usage("-o: hits have no pixels; only pictures make difference images".into()));
+    }
+    let mut report = hitfiles::compare(a, b)?;
+    if let (Some(scene), Some(rays)) = (&args.scene, &args.rays) {
+        let description = args.options.load(scene)?;
+        hitfiles::judge(&mut report, [a, b], &npy::read_rays(rays)?, &description)?;
+    }
+    let failures = args.limits.of_hits(&report)?;
+    finish(args, Found::Hits(&report), failures, || table::hits(&report))
+}
+
+fn finish(args: &CompareArgs, found: Found<'_>, failures: Vec<String>, text: impl FnOnce() -> String) -> Result<()> {
+    let failed = (!failures.is_empty()).then(|| Error::Mismatch(format!("compare: {}", failures.join("; "))));
+    if args.output.json {
+        json_to_stdout(&Report { a: &args.a, b: &args.b, pass: failed.is_none(), failures, found })?;
+    } else {
+        to_stdout(&text())?;
+    }
+    failed.map_or(Ok(()), Err)
+}
+
+fn write(args: &CompareArgs, path: &Path, (a, b): (&Picture, &Picture), maps: Option<&Maps>) -> Result<()> {
+    match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        Some("exr") => {
+            let film = pictures::difference_film(a, b, maps)?;
+            let info = ImageInfo {
+                software: format!("lanecast {}", env!("CARGO_PKG_VERSION")),
+                revision: REVISION.into(),
+                ..Default::default()
+            };
+            exr::write(path, &film, &info, Compression::Zip)
+        }
+        Some("png") => {
+            let maps =
+                maps.ok_or_else(|| Error::Usage("-o: the pictures have no colours to make a heat map of".into()))?;
+            let levels: Vec<f32>;
+            let (values, whole) = match args.map {
+                Map::Flip => (&maps.flip.values, Some(1.0)),
+                Map::HdrFlip => {
+                    let hdr = maps.hdr_flip.as_ref();
+                    let missing = || Error::Usage("--map hdr-flip: both pictures must hold linear light".into());
+                    (&hdr.ok_or_else(missing)?.values, Some(1.0))
+                }
+                Map::Error => (&maps.error, None),
+                Map::Levels => {
+                    levels = maps.levels.iter().map(|&l| f32::from(l)).collect();
+                    (&levels, None)
+                }
+            };
+            let full = args.full.or(whole).unwrap_or_else(|| heat::quantile(values, 0.999));
+            heat::write_png(path, a.film.window, values, full)
+        }
+        _ => Err(Error::Usage(format!("-o {}: expected a name that ends in .exr or .png", path.display()))),
+    }
+}
+
+impl Limits {
+    /// What of `report` is beyond a limit.
+    fn of_pictures(&self, report: &PictureReport) -> Result<Vec<String>> {
+        let colors = report.colors.as_ref();
+        let mut check = Check::default();
+        check.most("RMSE", self.max_rmse, colors.map(|c| c.rmse));
+        check.most("relative MSE", self.max_relmse, colors.map(|c| c.rel_mse));
+        check.least("PSNR", self.min_psnr, colors.map(|c| c.psnr));
+        check.least("SSIM", self.min_ssim, colors.and_then(|c| c.ssim));
+        check.most("FLIP", self.max_flip, colors.map(|c| c.flip));
+        check.most("HDR-FLIP", self.max_hdr_flip, colors.and_then(|c| c.hdr_flip));
+        check.most("ulp", self.max_ulp.map(|n| n as f64), report.max_ulp.map(|n| n as f64));
+        let classes = report.classes;
+        check.most("samples beyond", self.max_beyond.map(|n| n as f64), Some(classes.beyond as f64));
+        let different = classes.beyond + classes.within_one;
+        check.most("different samples", self.max_different.map(|n| n as f64), Some(different as f64));
+        let broken = colors.filter(|c| c.not_finite > 0 && (self.max_rmse.is_some() || self.max_relmse.is_some()));
+        if let Some(c) = broken {
+            check.failures.push(format!("{} samples are finite in one file only", c.not_finite));
+        }
+        check.done()
+    }
+
+    /// What of `report` is beyond a limit, and mismatches that nothing explains.
+    fn of_hits(&self, report: &HitReport) -> Result<Vec<String>> {
+        let figures = [self.max_rmse, self.max_relmse, self.min_psnr, self.min_ssim, self.max_flip, self.max_hdr_flip];
+        if figures.iter().any(Option::is_some) || self.max_ulp.is_some() {
+            return Err(Error::Usage("hits have the limits --max-beyond and --max-different only".into()));
+        }
+        let mut check = Check::default();
+        let classes = report.classes;
+        check.most("rays beyond", self.max_beyond.map(|n| n as f64), Some(classes.beyond as f64));
+        let different = classes.beyond + classes.within_one;
+        check.most("different rays", self.max_different.map(|n| n as f64), Some(different as f64));
+        if let Some(judged) = report.judged.as_ref().filter(|judged| judged.unexplained > 0) {
+            check.failures.push(format!("{} answers are not explained", judged.unexplained));
+        }
+        check.done()
+    }
+}
+
+/// Limits that were passed, or could not be checked.
+#[derive(Default)]
+struct Check {
+    failures: Vec<String>,
+    missing: Vec<&'static str>,
+}
+
+impl Check {
+    fn most(&mut self, what: &'static str, limit: Option<f64>, value: Option<f64>) {
+        self.check(what, limit, value, |value, limit| value <= limit);
+    }
+
+    fn least(&mut self, what: &'static str, limit: Option<f64>, value: Option<f64>) {
+        self.check(what, limit, value, |value, limit| value >= limit);
+    }
+
+    fn check(&mut self, what: &'static str, limit: Option<f64>, value: Option<f64>, fine: fn(f64, f64) -> bool) {
+        match (limit, value) {
+            (Some(limit), Some(value)) if !fine(value, limit) => {
+                self.failures.push(format!("{what} {value} is beyond the limit {limit}"));
+            }
+            (Some(_), None) => self.missing.push(what),
+            _ => {}
+        }
+    }
+
+    /// # Errors
+    /// A limit on something these files have not.
+    fn done(self) -> Result<Vec<String>> {
+        match self.missing.first() {
+            Some(what) => Err(Error::Usage(format!("there is a limit on {what}, which these pictures have not"))),
+            None => Ok(self.failures),
+        }
+    }
+}
+
+fn positive(text: &str) -> std::result::Result<f32, String> {
+    finite(text)?;
+    text.parse().ok().filter(|x| *x > 0.0).ok_or_else(|| "expected a number above 0".into())
+}
+
+fn finite(text: &str) -> std::result::Result<f32, String> {
+    text.parse().ok().filter(|x: &f32| x.is_finite()).ok_or_else(|| "expected a number".into())
+}
+
+fn density(text: &str) -> std::result::Result<f64, String> {
+    // The filters reach as far as the pixels are dense.
+    let fine = text.parse().ok().filter(|x: &f64| (1.0..=1000.0).contains(x));
+    fine.ok_or_else(|| "expected 1 to 1000 pixels per degree".into())
+}

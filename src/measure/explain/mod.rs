@@ -1,0 +1,270 @@
+//! Why one engine beats another: what each did per packet and per pixel, where its time goes, and what the tree is worth.
+//!
+//! Counts come from the counting builds of the same kernels, one packet at a time: an engine that traces n rays together gets
+//! n aligned consecutive rays, a square block of pixels. (`tile` chooses what to do by what its last tiles showed, so a
+//! block alone may be treated a little differently than in a stream.)
+
+mod share;
+mod spread;
+mod tree;
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::camera::{FILE_TILE, Tiling};
+use crate::error::{Error, Result};
+use crate::measure::raysets::{Query, RayKind};
+use crate::ray::{Counters, Hits, Rays};
+use crate::scene::world::World;
+use crate::trace::{Engine, Engines, Scratch};
+
+pub use share::Shares;
+pub use spread::Spread;
+pub use tree::{Quality, quality};
+
+/// Times each batch is traced by the clock; the fastest counts.
+const REPEATS: usize = 5;
+
+/// What one engine did with one class of rays.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Work {
+    /// The engine.
+    pub engine: &'static str,
+    /// Rays traced together.
+    pub lanes: usize,
+    /// Packets with a live ray.
+    pub packets: u64,
+    /// Live rays.
+    pub rays: u64,
+    /// Per packet.
+    pub per_packet: PerPacket,
+    /// Per live ray, over all: node visits.
+    pub nodes_per_ray: f64,
+    /// Box tests.
+    pub boxes_per_ray: f64,
+    /// Leaf visits.
+    pub leaves_per_ray: f64,
+    /// Primitive tests.
+    pub prims_per_ray: f64,
+    /// Of the boxes of visited nodes, the share that met the packet's bounds and was tested (single rays: met the ray).
+    pub boxes_passed: f64,
+    /// Million rays per second of the fastest passes, one thread, live rays only.
+    pub mrays_per_s: f64,
+    /// Where the time goes, by a fit; `None` if there are too few batches or the fit says nothing.
+    pub shares: Option<Shares>,
+    /// Node visits and primitive tests per ray of each pixel, if the rays belong to pixels.
+    #[serde(skip)]
+    pub maps: Option<Maps>,
+}
+
+/// Distributions over packets.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct PerPacket {
+    /// Node visits.
+    pub nodes: Spread,
+    /// Box tests.
+    pub boxes: Spread,
+    /// Leaf visits.
+    pub leaves: Spread,
+    /// Primitive tests.
+    pub prims: Spread,
+    /// Share of lanes that wanted a node visit, per cent.
+    pub node_lanes: Spread,
+    /// Share of lanes that wanted a primitive test, per cent.
+    pub prim_lanes: Spread,
+    /// Bytes of nodes and leaf blocks that were looked at, again and again if need be.
+    pub bytes: Spread,
+}
+
+/// Values per pixel, row-major.
+#[derive(Clone, Debug)]
+pub struct Maps {
+    /// Width and height.
+    pub size: (u32, u32),
+    /// Node visits per live ray of the pixel's packet.
+    pub nodes: Vec<f32>,
+    /// Primitive tests per live ray of the pixel's packet.
+    pub prims: Vec<f32>,
+}
+
+/// Counts and times `engine` on `batches` of the class `kind`, made for a picture of `size`. Counting runs on the current
+/// rayon pool, the clock on one thread.
+///
+/// # Errors
+/// [`Error::Interrupted`] when `stop` says so.
+pub fn work<S: Engines>(
+    engine: &dyn Engine<S>,
+    world: &World<S>,
+    batches: &[Rays<S>],
+    kind: RayKind,
+    size: (u32, u32),
+    stop: &dyn Fn() -> bool,
+) -> Result<Work> {
+    let lanes = engine.lanes().max(1);
+    let query = kind.query();
+    let counted: Vec<Vec<Counters>> = batches
+        .par_iter()
+        .map(|batch| packets(batch, lanes).map(|p| count(engine, world, &p, query)).collect())
+        .collect();
+    let all: Vec<&Counters> = counted.iter().flatten().filter(|c| c.rays > 0).collect();
+    let mut total = Counters::default();
+    all.iter().for_each(|c| total += **c);
+    let spread = |value: &dyn Fn(&Counters) -> f64| Spread::of(all.iter().map(|c| value(c)).collect());
+    let share = |active: u64, lanes: u64| 100.0 * active as f64 / lanes.max(1) as f64;
+    let (node_bytes, leaf_bytes) = sizes(world);
+    let rays = total.rays.max(1) as f64;
+    let (seconds, shares) = clock(engine, world, batches, query, stop)?;
+    Ok(Work {
+        engine: engine.name(),
+        lanes,
+        packets: all.len() as u64,
+        rays: total.rays,
+        per_packet: PerPacket {
+            nodes: spread(&|c| c.nodes as f64),
+            boxes: spread(&|c| c.boxes as f64),
+            leaves: spread(&|c| c.leaves as f64),
+            prims: spread(&|c| c.prims as f64),
+            node_lanes: spread(&|c| share(c.node_lanes_active, c.node_lanes_total)),
+            prim_lanes: spread(&|c| share(c.prim_lanes_active, c.prim_lanes_total)),
+            bytes: spread(&|c| c.nodes as f64 * node_bytes + c.leaves as f64 * leaf_bytes),
+        },
+        nodes_per_ray: total.nodes as f64 / rays,
+        boxes_per_ray: total.boxes as f64 / rays,
+        leaves_per_ray: total.leaves as f64 / rays,
+        prims_per_ray: total.prims as f64 / rays,
+        boxes_passed: total.boxes as f64 / (8 * total.nodes).max(1) as f64,
+        mrays_per_s: if seconds > 0.0 { total.rays as f64 / seconds / 1e6 } else { 0.0 },
+        shares,
+        maps: (kind != RayKind::Scatter).then(|| maps(&counted, lanes, size)).transpose()?,
+    })
+}
+
+/// Aligned consecutive rays, `lanes` at a time.
+fn packets<S: Engines>(batch: &Rays<S>, lanes: usize) -> impl Iterator<Item = Rays<S>> {
+    (0..batch.len()).step_by(lanes).map(move |first| {
+        let count = lanes.min(batch.len() - first);
+        let mut rays = Rays::new(count);
+        for slot in 0..count {
+            let i = first + slot;
+            rays.set(slot, batch.org(i), batch.dir(i), batch.t_min[i], batch.t_max[i]);
+        }
+        rays
+    })
+}
+
+fn count<S: Engines>(engine: &dyn Engine<S>, world: &World<S>, rays: &Rays<S>, query: Query) -> Counters {
+    let (mut counters, mut scratch) = (Counters::default(), Scratch::default());
+    match query {
+        Query::Closest => engine.intersect(world, rays, &mut Hits::new(0), &mut scratch, Some(&mut counters)),
+        Query::Any => engine.occluded(world, rays, &mut Vec::new(), &mut scratch, Some(&mut counters)),
+    }
+    counters
+}
+
+/// Bytes of a node and, on average, of a leaf block.
+fn sizes<S: Engines>(world: &World<S>) -> (f64, f64) {
+    let stats = world.stats();
+    let mean = |bytes: u64, count: u64| bytes as f64 / count.max(1) as f64;
+    (mean(stats.node_bytes, stats.nodes), mean(stats.prim_bytes, stats.leaves))
+}
+
+/// Seconds for all batches at their fastest, and the fit of the batches' times to their counts.
+fn clock<S: Engines>(
+    engine: &dyn Engine<S>,
+    world: &World<S>,
+    batches: &[Rays<S>],
+    query: Query,
+    stop: &dyn Fn() -> bool,
+) -> Result<(f64, Option<Shares>)> {
+    let (mut hits, mut flags, mut scratch) = (Hits::new(0), Vec::new(), Scratch::default());
+    let mut fastest = vec![f64::INFINITY; batches.len()];
+    for _ in 0..REPEATS {
+        if stop() {
+            return Err(Error::Interrupted);
+        }
+        for (rays, fastest) in batches.iter().zip(&mut fastest) {
+            let start = Instant::now();
+            match query {
+                Query::Closest => engine.intersect(world, rays, &mut hits, &mut scratch, None),
+                Query::Any => engine.occluded(world, rays, &mut flags, &mut scratch, None),
+            }
+            *fastest = fastest.min(start.elapsed().as_secs_f64());
+        }
+    }
+    let whole: Vec<Counters> = batches.iter().map(|rays| count(engine, world, rays, query)).collect();
+    let seconds = fastest.iter().zip(&whole).filter(|(_, c)| c.rays > 0).map(|(s, _)| s).sum();
+    Ok((seconds, share::fit(&fastest, &whole)))
+}
+
+fn maps(counted: &[Vec<Counters>], lanes: usize, (width, height): (u32, u32)) -> Result<Maps> {
+    let tiling = Tiling::new(width, height, FILE_TILE)?;
+    let pixels = width as usize * height as usize;
+    let (mut nodes, mut prims) = (vec![0.0; pixels], vec![0.0; pixels]);
+    let per_batch = u64::from(tiling.rays_per_tile());
+    for (batch, packets) in counted.iter().enumerate() {
+        for (packet, c) in packets.iter().enumerate() {
+            let rays = c.rays.max(1) as f32;
+            for lane in 0..lanes as u64 {
+                let slot = packet as u64 * lanes as u64 + lane;
+                let index = batch as u64 * per_batch + slot;
+                let Some((x, y)) = tiling.pixel(index).filter(|_| slot < per_batch) else { continue };
+                let at = y as usize * width as usize + x as usize;
+                nodes[at] = c.nodes as f32 / rays;
+                prims[at] = c.prims as f32 / rays;
+            }
+        }
+    }
+    Ok(Maps { size: (width, height), nodes, prims })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::eye::View;
+    use crate::scene::description::{CameraDescription, Description, Projection};
+    use crate::scene::load::{LoadOptions, load};
+    use crate::scene::world::Preset;
+    use crate::trace::engine;
+
+    fn cornell() -> (World<f32>, Vec<Rays<f32>>, Description) {
+        let scene = load("builtin:cornell", &LoadOptions::default()).unwrap();
+        let world = World::<f32>::compile(&scene, Preset::Fast).unwrap();
+        let framing = |_| -> Result<CameraDescription> { Ok(scene.cameras[0].clone()) };
+        let view = View::new(&world, &scene, &framing, (64, 40), 1).unwrap();
+        let rays = view.rays(&world, RayKind::Primary);
+        (world, rays, scene)
+    }
+
+    /// What is counted packet by packet adds up to what one pass over everything counts; maps hold the same sum.
+    #[test]
+    fn packets_add_up_to_the_whole() {
+        let (world, batches, scene) = cornell();
+        assert!(matches!(scene.cameras[0].projection, Projection::Perspective { .. }), "a camera with one origin");
+        for name in ["scalar", "packet8"] {
+            let engine = engine::<f32>(name).unwrap();
+            let work = work(engine, &world, &batches, RayKind::Primary, (64, 40), &|| false).unwrap();
+            let mut whole = Counters::default();
+            batches.iter().for_each(|rays| whole += count(engine, &world, rays, Query::Closest));
+            assert_eq!((work.rays, work.packets), (whole.rays, 2560 / work.lanes as u64), "{name}");
+            let sum = work.per_packet.nodes.mean * work.packets as f64;
+            assert!((sum - whole.nodes as f64).abs() < 1e-6 * sum, "{name}: {sum} {}", whole.nodes);
+            let maps = work.maps.unwrap();
+            let mapped: f64 = maps.nodes.iter().map(|&x| f64::from(x)).sum();
+            assert!((mapped - whole.nodes as f64).abs() < 1e-3 * mapped, "{name}: {mapped} {}", whole.nodes);
+            assert!(work.mrays_per_s > 0.0 && work.per_packet.node_lanes.max <= 100.0);
+        }
+    }
+
+    #[test]
+    fn wider_packets_visit_fewer_nodes_per_ray() {
+        let (world, batches, _) = cornell();
+        let nodes = |name| {
+            let engine = engine::<f32>(name).unwrap();
+            work(engine, &world, &batches, RayKind::Primary, (64, 40), &|| false).unwrap().nodes_per_ray
+        };
+        assert!(nodes("packet16") < 0.3 * nodes("scalar"));
+        let stopped = work(engine::<f32>("scalar").unwrap(), &world, &batches, RayKind::Primary, (64, 40), &|| true);
+        assert!(matches!(stopped, Err(Error::Interrupted)));
+    }
+}

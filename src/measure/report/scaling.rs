@@ -1,0 +1,99 @@
+//! How rates change with the number of threads, of primitives and of rays in the same picture.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use maud::Markup;
+
+use super::collect::{Found, Row};
+use super::figures::{Section, figure, table, with_interval};
+use super::plot::{Line, Places, lines};
+use crate::measure::intervals::Estimate;
+
+/// A way a scene can grow.
+struct Axis {
+    /// The column that grows.
+    column: &'static str,
+    /// Its name on the plot.
+    unit: &'static str,
+    /// What stays the same within a figure.
+    same: [&'static str; 5],
+    /// Fewest different values that make a figure.
+    least: usize,
+    places: Places,
+}
+
+fn axes() -> [Axis; 3] {
+    [
+        Axis {
+            column: "threads",
+            unit: "threads",
+            same: ["scene", "scene_hash", "class", "precision", "rays"],
+            least: 2,
+            places: Places::Linear,
+        },
+        Axis {
+            column: "prims",
+            unit: "primitives",
+            same: ["scene", "threads", "class", "precision", "rays"],
+            least: 3,
+            places: Places::Logarithmic,
+        },
+        Axis {
+            column: "rays",
+            unit: "rays",
+            same: ["scene", "scene_hash", "class", "precision", "threads"],
+            least: 3,
+            places: Places::Logarithmic,
+        },
+    ]
+}
+
+/// Scaling figures, where rows allow some.
+pub fn section(found: &Found) -> Option<Section> {
+    let figures = axes().iter().flat_map(|axis| of_axis(found, axis)).collect();
+    let about = "Million rays per second over what grows; of several runs with the same size, the newest.";
+    Section::of_figures("scaling", "Scaling", about, figures)
+}
+
+fn of_axis(found: &Found, axis: &Axis) -> Vec<Markup> {
+    let mut groups: BTreeMap<[String; 5], Vec<&Row>> = BTreeMap::new();
+    for row in found.rows.iter().filter(|row| row.is_timed() && row.is_quoted()) {
+        groups.entry(row.key(axis.same)).or_default().push(row);
+    }
+    let distinct = |rows: &[&Row]| rows.iter().map(|row| row.text(axis.column)).collect::<BTreeSet<_>>().len();
+    groups.retain(|_, rows| distinct(rows) >= axis.least);
+    groups.into_iter().map(|(key, rows)| one(axis, &key, &rows)).collect()
+}
+
+fn one(axis: &Axis, key: &[String; 5], rows: &[&Row]) -> Markup {
+    // By engine, then by place; a later run replaces an earlier one.
+    let mut series: BTreeMap<String, BTreeMap<u64, (Estimate, &Row)>> = BTreeMap::new();
+    for row in rows {
+        if let (Some(x), Some(rate)) = (row.number(axis.column), row.rate()) {
+            series.entry(row.text("engine").into()).or_default().insert(x as u64, (rate, row));
+        }
+    }
+    let drawn: Vec<Line> = series
+        .iter()
+        .map(|(engine, points)| Line {
+            label: engine.clone(),
+            points: points.iter().map(|(x, (rate, _))| (*x as f64, *rate)).collect(),
+        })
+        .collect();
+    let used: Vec<&Row> = series.values().flat_map(|points| points.values().map(|(_, row)| *row)).collect();
+    let body: Vec<Vec<String>> = series
+        .iter()
+        .flat_map(|(engine, points)| {
+            let first = points.values().next().map(|(rate, _)| rate.value);
+            points.iter().map(move |(x, (rate, _))| {
+                let relative = first.map_or("-".into(), |first| format!("{:.2}", rate.value / first));
+                vec![engine.clone(), x.to_string(), with_interval(Some(*rate), 2), relative]
+            })
+        })
+        .collect();
+    let head = ["engine", axis.unit, "Mrays/s (95 %)", "over the first"];
+    let [scene, _, class, precision, last] = key;
+    let title = format!("{scene}, {class} rays over {} ({precision}, {}: {last})", axis.unit, axis.same[4]);
+    let plot = lines(&drawn, &axis.places, axis.unit, "million rays per second");
+    figure(&title, plot, &table(&head, &body), &used)
+}

@@ -1,0 +1,240 @@
+//! A database's regions as a scene: one tree of solids for each, in BRL-CAD's order, with colour and shader.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::boolean::Step;
+use super::boxes;
+use super::lower::{self, TOLERANCE};
+use super::model::{Database, ObjectKind};
+use super::regions::{PlacedRegion, Problem, walk};
+use super::shader::Shader;
+use super::solid::Solid;
+use super::tops::choose_tops;
+use super::view::View;
+use crate::error::{Error, Place, Result};
+use crate::scene::description::{CameraDescription, Description, Item, ItemKind, Material, MaterialId, Precision};
+use crate::scene::solids::flat::FlatTree;
+use crate::scene::solids::{NodeId, NodeKind, SolidTree};
+
+/// Azimuth and elevation of `rt`'s default view, degrees.
+pub const DEFAULT_VIEW: (f64, f64) = (35.0, 25.0);
+/// Most problems listed in an error.
+const LISTED: usize = 10;
+
+/// What a description keeps of a database: the looks of its regions, which are parts of object 0 in the same order.
+#[derive(Clone, Debug, Default)]
+pub struct Looks {
+    /// One for each part.
+    pub regions: Vec<Look>,
+    /// Box around all bounded regions: what `rt` frames.
+    pub bounds: Option<(DVec3, DVec3)>,
+    /// Shaders of regions that fill all space behind the others (`envmap`); their solids are not there.
+    pub surroundings: Option<Shader>,
+}
+
+/// How a region looks.
+#[derive(Clone, Debug, Default)]
+pub struct Look {
+    /// Its path, names after slashes.
+    pub path: String,
+    /// Region number.
+    pub id: i32,
+    /// Colour, 0 to 1; `None` if the database gives none.
+    pub color: Option<DVec3>,
+    /// Its shader; `None` if the database gives none.
+    pub shader: Option<Shader>,
+    /// For a region of one solid: where it stands, which is where a light of it shines from.
+    pub centre: Option<DVec3>,
+    /// Its box, if it is bounded.
+    pub bounds: Option<(DVec3, DVec3)>,
+    /// For a region of one arb: its corners in place.
+    pub arb: Option<Box<[DVec3; 8]>>,
+    /// Rotation and scale of its only solid's place: the direction a light of it aims in turns with it.
+    pub place: DAffine3,
+}
+
+/// How to show a database.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Names of the objects to show; empty chooses as [`choose_tops`] says.
+    pub tops: Vec<String>,
+    /// Whether what cannot be shown is left out with a warning instead of being an error.
+    pub lenient: bool,
+}
+
+/// The regions below the chosen objects of `database` as a scene called `name`.
+///
+/// # Errors
+/// Unknown objects, cycles, models too large; without `lenient`, whatever cannot be shown, by kind, name and place.
+pub fn describe(file: &Path, name: &str, database: &Database, options: &Options) -> Result<Description> {
+    let tops = choose_tops(database, &options.tops)?;
+    let mut found = walk(file, database, &tops)?;
+    let mut description = Description::new(name);
+    description.precision = Some(Precision::F64);
+    description.warnings.clone_from(&database.warnings);
+    let mut looks = Looks::default();
+    for region in &found.regions {
+        let shader = region.shader.and_then(|object| shader_of(database, object));
+        if let Some(surroundings) = shader.as_ref().filter(|shader| shader.name == "envmap") {
+            looks.surroundings = Some(surroundings.clone());
+            continue;
+        }
+        let tree = region_tree(database, region, &mut found.problems);
+        add_region(&mut description, database, region, tree, shader, &mut looks);
+    }
+    if found.air > 0 {
+        description.warnings.push(format!("{} regions of air are left out", found.air));
+    }
+    report(file, &found.problems, options.lenient, &mut description)?;
+    description.cameras.push(default_camera(looks.bounds));
+    description.looks = Some(Arc::new(looks));
+    Ok(description)
+}
+
+fn shader_of(database: &Database, object: u32) -> Option<Shader> {
+    match &database.objects[object as usize].kind {
+        ObjectKind::Combination(combination) => combination.shader.as_deref().map(Shader::parse),
+        _ => None,
+    }
+}
+
+/// One region as an item, with its material and its look.
+fn add_region(
+    description: &mut Description,
+    database: &Database,
+    region: &PlacedRegion,
+    tree: SolidTree,
+    shader: Option<Shader>,
+    looks: &mut Looks,
+) {
+    let index = description.solids.len() as u32;
+    description.solids.push(Arc::new(tree));
+    let material = material(description, region.color);
+    let kind = ItemKind::Solids(index);
+    description.groups[0].items.push(Item { transform: DAffine3::IDENTITY, material, kind });
+    let object = |i: usize| Some(&database.objects[region.solids.get(i)?.object as usize].kind);
+    let solid = |i: usize| match object(i)? {
+        ObjectKind::Solid(solid) => Some(solid),
+        _ => None,
+    };
+    let bounds = boxes::of_region(region, |i| solid(i).map(|s| lower::bounds(s, &region.solids[i].transform)));
+    let centre = match region.solids.as_slice() {
+        [only] => solid(0).and_then(|solid| solid.centre()).map(|centre| only.transform.transform_point3(centre)),
+        _ => None,
+    };
+    let arb = match (region.solids.as_slice(), solid(0)) {
+        ([only], Some(Solid::Arb { points })) => Some(Box::new(points.map(|p| only.transform.transform_point3(p)))),
+        _ => None,
+    };
+    let all = [looks.bounds, bounds].into_iter().flatten();
+    looks.bounds = all.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    looks.regions.push(Look {
+        path: region.path.clone(),
+        id: region.region.id,
+        color: region.color,
+        shader,
+        centre,
+        bounds,
+        arb,
+        place: region.solids.first().map_or(DAffine3::IDENTITY, |solid| solid.transform),
+    });
+}
+
+/// The material of a colour: databases use few.
+fn material(description: &mut Description, color: Option<DVec3>) -> Option<MaterialId> {
+    let diffuse = color?;
+    let known = description.materials.iter().skip(1).position(|material| material.diffuse == diffuse);
+    let id = known.map_or(description.materials.len(), |i| i + 1);
+    if known.is_none() {
+        let name = format!("color {:.0}/{:.0}/{:.0}", diffuse.x * 255.0, diffuse.y * 255.0, diffuse.z * 255.0);
+        description.materials.push(Material { name, diffuse, ..Material::default() });
+    }
+    Some(id as MaterialId)
+}
+
+/// The region's expression over its solids; what cannot be built counts as empty and is a problem.
+fn region_tree(database: &Database, region: &PlacedRegion, problems: &mut Vec<Problem>) -> SolidTree {
+    let mut tree = SolidTree::new(region.path.clone());
+    tree.id = region.region.id.into();
+    tree.tolerance = TOLERANCE;
+    let mut stack: Vec<NodeId> = Vec::new();
+    for &step in region.expression.steps() {
+        let node = match step {
+            Step::Member(i) => {
+                let placed = region.solids[i as usize];
+                let object = &database.objects[placed.object as usize];
+                let built = match &object.kind {
+                    ObjectKind::Solid(solid) => lower::add(&mut tree, solid, &placed.transform),
+                    _ => Err("not a solid".into()),
+                };
+                built.unwrap_or_else(|what| {
+                    if !problems.iter().rev().take(1000).any(|problem| problem.object == object.name) {
+                        problems.push(Problem { object: object.name.clone(), place: object.place, what });
+                    }
+                    tree.op(NodeKind::Union(Vec::new()))
+                })
+            }
+            Step::Empty => tree.op(NodeKind::Union(Vec::new())),
+            operator => {
+                let (Some(b), Some(a)) = (stack.pop(), stack.pop()) else { continue };
+                apply(&mut tree, operator, a, b)
+            }
+        };
+        stack.push(node);
+    }
+    tree.root = stack.pop().unwrap_or_default();
+    if let Err(what) = FlatTree::new(&tree) {
+        let place = region.solids.first().map_or(Place::Whole, |s| database.objects[s.object as usize].place);
+        problems.push(Problem { object: region.path.clone(), place, what });
+        tree.nodes.clear();
+        tree.root = tree.op(NodeKind::Union(Vec::new()));
+    }
+    tree
+}
+
+/// An operator on two nodes; a chain of one operator becomes one node with many operands.
+fn apply(tree: &mut SolidTree, operator: Step, a: NodeId, b: NodeId) -> NodeId {
+    match (operator, &mut tree.nodes[a as usize].kind) {
+        (Step::Union, NodeKind::Union(list)) if !list.is_empty() => list.push(b),
+        (Step::Intersection, NodeKind::Intersection(list)) | (Step::Difference, NodeKind::Difference(list)) => {
+            list.push(b)
+        }
+        (Step::Union, _) => return tree.op(NodeKind::Union(vec![a, b])),
+        (Step::Intersection, _) => return tree.op(NodeKind::Intersection(vec![a, b])),
+        (Step::Difference, _) => return tree.op(NodeKind::Difference(vec![a, b])),
+        _ => return tree.op(NodeKind::Xor(vec![a, b])),
+    }
+    a
+}
+
+/// Problems as warnings, or as one error at the place of the first.
+fn report(file: &Path, problems: &[Problem], lenient: bool, description: &mut Description) -> Result<()> {
+    let line = |problem: &Problem| match problem.place {
+        Place::LineColumn { line, .. } => format!("`{}` (line {line}): {}", problem.object, problem.what),
+        Place::Byte(at) => format!("`{}` (byte {at}): {}", problem.object, problem.what),
+        Place::Whole => format!("`{}`: {}", problem.object, problem.what),
+    };
+    let Some(first) = problems.first() else { return Ok(()) };
+    if lenient {
+        description.warnings.extend(problems.iter().take(100).map(|p| format!("left out: {}", line(p))));
+        return Ok(());
+    }
+    let mut what = format!("`{}`: {}", first.object, first.what);
+    for other in problems.iter().skip(1).take(LISTED) {
+        what = format!("{what}\n  also {}", line(other));
+    }
+    if problems.len() > LISTED + 1 {
+        what = format!("{what}\n  and {} more", problems.len() - LISTED - 1);
+    }
+    Err(Error::input(file, first.place, what).with_help("--lenient shows the rest"))
+}
+
+/// `rt`'s default view as a camera. It samples the centres of pixels; only views as such sample as `rt` does.
+fn default_camera(bounds: Option<(DVec3, DVec3)>) -> CameraDescription {
+    let (az, el) = DEFAULT_VIEW;
+    let bounds = bounds.unwrap_or((DVec3::NEG_ONE, DVec3::ONE));
+    View::around(bounds, az.to_radians(), el.to_radians()).camera("default", 1.0)
+}

@@ -1,0 +1,41 @@
+//! Where an engine's answers go.
+
+use crate::lanes::{Lanes, Real};
+use crate::ray::{HitPacket, Hits};
+
+/// The answers of one call. Shape: one per ray of the batch.
+pub enum Output<'a, S> {
+    /// Closest hits.
+    Closest(&'a mut Hits<S>),
+    /// Any-hit: 1 is occluded.
+    Any(&'a mut [u8]),
+}
+
+impl<S: Real> Output<'_, S> {
+    /// The same for a callee.
+    pub fn reborrow(&mut self) -> Output<'_, S> {
+        match self {
+            Self::Closest(hits) => Output::Closest(hits),
+            Self::Any(out) => Output::Any(out),
+        }
+    }
+
+    /// Writes what rays `first..first + N` found: their hits or (any-hit) `done`.
+    #[inline(always)]
+    pub fn put<V: Lanes<Scalar = S>>(&mut self, first: usize, hit: &HitPacket<V>, done: u32) {
+        match self {
+            Self::Closest(hits) => hit.store(hits, first),
+            Self::Any(_) => self.put_any(first, V::N, done),
+        }
+    }
+
+    /// Writes what `n` rays from `first` on found.
+    #[inline(always)]
+    pub fn put_any(&mut self, first: usize, n: usize, done: u32) {
+        if let Self::Any(out) = self {
+            for (lane, out) in out[first..].iter_mut().take(n).enumerate() {
+                *out = (done >> lane & 1) as u8;
+            }
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! A chunk of rays of one octant as structures of arrays, and what they have found.
+
+use super::OCTANTS;
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
+use crate::ray::slab::Interval;
+use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
+use crate::scene::world::Instance;
+use crate::shape::{Turned, around};
+
+/// Most rays in a chunk: one bit each in a word.
+pub const RAYS: usize = 64;
+
+/// Up to this many rays go into an instance one by one.
+const FEW: u32 = 4;
+
+/// Rays in one space, prepared for the kernels as [`Packet`]s are. Entries from `len` on are unspecified.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub struct Chunk<S> {
+    /// Origins.
+    pub org: [[S; RAYS]; 3],
+    /// Origins with their component along the dominant axis first, then the two that follow it.
+    pub around: [[S; RAYS]; 3],
+    /// Directions.
+    pub dir: [[S; RAYS]; 3],
+    /// Finite reciprocals of the directions.
+    pub rcp: [[S; RAYS]; 3],
+    /// See [`Packet::shear`].
+    pub shear: [[S; RAYS]; 3],
+    /// Start of the segments.
+    pub t_min: [S; RAYS],
+    /// See [`Packet::t_floor`].
+    pub t_floor: [S; RAYS],
+    /// Dominant axis of each ray.
+    pub axis: [u8; RAYS],
+    /// Rays with each dominant axis.
+    pub dominant: [u64; 3],
+    /// Sum of the directions.
+    pub mean: [S; 3],
+    /// Number of rays.
+    pub len: usize,
+}
+
+/// The best hits of a chunk so far.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub struct Best<S> {
+    /// Best `t`, or the segment's end.
+    pub t: [S; RAYS],
+    u: [S; RAYS],
+    v: [S; RAYS],
+    prim: [u32; RAYS],
+    inst: [u32; RAYS],
+    /// Any-hit: rays that found something.
+    pub done: u64,
+}
+
+impl<S: Real> Default for Chunk<S> {
+    fn default() -> Self {
+        let zero = [S::ZERO; RAYS];
+        Self {
+            org: [zero; 3],
+            around: [zero; 3],
+            dir: [zero; 3],
+            rcp: [zero; 3],
+            shear: [zero; 3],
+            t_min: zero,
+            t_floor: zero,
+            axis: [0; RAYS],
+            dominant: [0; 3],
+            mean: [S::ZERO; 3],
+            len: 0,
+        }
+    }
+}
+
+#[inline(always)]
+fn load3<V: Lanes>(from: &[[V::Scalar; RAYS]; 3], at: usize) -> Lanes3<V> {
+    [V::load(&from[0][at..]), V::load(&from[1][at..]), V::load(&from[2][at..])]
+}
+
+#[inline(always)]
+fn store3<V: Lanes>(from: Lanes3<V>, to: &mut [[V::Scalar; RAYS]; 3], at: usize) {
+    from.into_iter().zip(to).for_each(|(x, to)| x.store(&mut to[at..]));
+}
+
+impl<S: Real> Chunk<S> {
+    /// Takes rays from a batch.
+    #[inline(always)]
+    pub fn gather<V: Lanes<Scalar = S>>(&mut self, rays: &Rays<S>, ids: &[u32]) {
+        self.len = ids.len();
+        for (i, &id) in ids.iter().enumerate() {
+            for axis in 0..3 {
+                self.org[axis][i] = rays.org[axis][id as usize];
+                self.dir[axis][i] = rays.dir[axis][id as usize];
+            }
+            self.t_min[i] = rays.t_min[id as usize];
+        }
+        for at in (0..self.len).step_by(V::N) {
+            let (org, dir) = (load3::<V>(&self.org, at), load3::<V>(&self.dir, at));
+            self.put(at, &Packet::new(org, dir, V::load(&self.t_min[at..])));
+        }
+        self.mean = self.sum_of_directions();
+    }
+
+    /// The rays of `from` that meet an instance's box before `t`, in its space and at the same places. Returns which.
+    #[inline(always)]
+    pub fn enter<V: Lanes<Scalar = S>>(
+        &mut self,
+        from: &Self,
+        instance: &Instance<S>,
+        t: &[S; RAYS],
+        rays: u64,
+    ) -> u64 {
+        self.len = from.len;
+        let mut inside = 0;
+        if rays.count_ones() <= FEW {
+            let mut rest = rays;
+            while rest != 0 {
+                let i = rest.trailing_zeros() as usize & (RAYS - 1);
+                rest &= rest - 1;
+                inside |= self.enter_vector::<S>(from, instance, t, i, 1);
+            }
+        } else {
+            for at in (0..self.len).step_by(V::N) {
+                inside |= self.enter_vector::<V>(from, instance, t, at, (rays >> at) as u32 & V::ALL);
+            }
+            self.mean = self.sum_of_directions();
+        }
+        inside
+    }
+
+    #[inline(always)]
+    fn enter_vector<V: Lanes<Scalar = S>>(
+        &mut self,
+        from: &Self,
+        instance: &Instance<S>,
+        t: &[S; RAYS],
+        at: usize,
+        lanes: u32,
+    ) -> u64 {
+        if lanes == 0 {
+            return 0;
+        }
+        let packet = from.packet::<V>(at);
+        let interval = Interval::of(&packet, instance.bounds.lo, instance.bounds.hi);
+        let meets = interval.meets(packet.t_min, V::load(&t[at..])).bits() & lanes;
+        if meets == 0 {
+            return 0;
+        }
+        let local = packet.into_local(&instance.to_local, interval.near);
+        store3(local.org, &mut self.org, at);
+        store3(local.dir, &mut self.dir, at);
+        local.t_min.store(&mut self.t_min[at..]);
+        self.put(at, &local);
+        u64::from(meets) << at
+    }
+
+    fn sum_of_directions(&self) -> [S; 3] {
+        [0, 1, 2].map(|a| self.dir[a][..self.len].iter().fold(S::ZERO, |sum, &d| sum + d))
+    }
+
+    /// Puts in what kernels need beside origins and directions.
+    #[inline(always)]
+    fn put<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>) {
+        store3(packet.rcp, &mut self.rcp, at);
+        store3(packet.shear, &mut self.shear, at);
+        packet.t_floor.store(&mut self.t_floor[at..]);
+        let dominant = packet.dominant.map(V::Mask::from_bits);
+        let turned = [0, 1, 2].map(|axis| around(packet.org, axis));
+        let pick = |i: usize| V::select(dominant[0], turned[0][i], V::select(dominant[1], turned[1][i], turned[2][i]));
+        store3([0, 1, 2].map(pick), &mut self.around, at);
+        let [_, y, z] = packet.dominant;
+        for lane in 0..V::N {
+            self.axis[at + lane] = (y >> lane & 1 | (z >> lane & 1) << 1) as u8;
+        }
+        for (mask, bits) in self.dominant.iter_mut().zip(packet.dominant) {
+            *mask = *mask & !(u64::from(V::ALL) << at) | u64::from(bits) << at;
+        }
+    }
+
+    /// A ray around its dominant axis.
+    #[inline(always)]
+    pub fn turned(&self, ray: usize) -> Turned<S> {
+        let axis = usize::from(self.axis[ray]);
+        let pick = |v: &[[S; RAYS]; 3]| [v[0][ray], v[1][ray], v[2][ray]];
+        Turned { axis, org: pick(&self.around), shear: pick(&self.shear), rcp: self.rcp[axis.min(2)][ray] }
+    }
+
+    /// Rays `at..at + N` as a packet.
+    #[inline(always)]
+    pub fn packet<V: Lanes<Scalar = S>>(&self, at: usize) -> Packet<V> {
+        Packet {
+            org: load3(&self.org, at),
+            dir: load3(&self.dir, at),
+            rcp: load3(&self.rcp, at),
+            t_min: V::load(&self.t_min[at..]),
+            t_floor: V::load(&self.t_floor[at..]),
+            dominant: self.dominant.map(|mask| (mask >> at) as u32 & V::ALL),
+            shear: load3(&self.shear, at),
+        }
+    }
+
+    /// Rays by octant.
+    pub fn octants(&self, rays: u64) -> [u64; OCTANTS] {
+        let mut masks = [0; OCTANTS];
+        let mut rest = rays;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize & (RAYS - 1);
+            rest &= rest - 1;
+            let octant = (0..3).fold(0, |o, axis| o | usize::from(self.rcp[axis][i] < S::ZERO) << axis);
+            masks[octant] |= 1 << i;
+        }
+        masks
+    }
+}
+
+impl<S: Real> Default for Best<S> {
+    fn default() -> Self {
+        let (zero, none) = ([S::ZERO; RAYS], [INVALID_ID; RAYS]);
+        Self { t: zero, u: zero, v: zero, prim: none, inst: none, done: 0 }
+    }
+}
+
+impl<S: Real> Best<S> {
+    /// Nothing found yet.
+    #[inline(always)]
+    pub fn start(&mut self, rays: &Rays<S>, ids: &[u32]) {
+        for (t, &id) in self.t.iter_mut().zip(ids) {
+            *t = rays.t_max[id as usize];
+        }
+        self.prim = [INVALID_ID; RAYS];
+        self.inst = [INVALID_ID; RAYS];
+        self.done = 0;
+    }
+
+    /// Rays whose segments, as far as they are still looked at, reach to `near`.
+    #[inline(always)]
+    pub fn reaching<V: Lanes<Scalar = S>>(&self, near: S) -> u64 {
+        let near = V::splat(near);
+        (0..RAYS).step_by(V::N).fold(0, |all, at| all | u64::from(near.cmp_le(V::load(&self.t[at..])).bits()) << at)
+    }
+
+    /// The hits of rays `at..at + N`.
+    #[inline(always)]
+    pub fn packet<V: Lanes<Scalar = S>>(&self, at: usize) -> HitPacket<V> {
+        let mut hit = HitPacket::new(V::load(&self.t[at..]));
+        (hit.u, hit.v) = (V::load(&self.u[at..]), V::load(&self.v[at..]));
+        hit.prim[..V::N].copy_from_slice(&self.prim[at..at + V::N]);
+        hit.inst[..V::N].copy_from_slice(&self.inst[at..at + V::N]);
+        hit
+    }
+
+    /// Puts back what [`Best::packet`] took out.
+    #[inline(always)]
+    pub fn put<V: Lanes<Scalar = S>>(&mut self, at: usize, hit: &HitPacket<V>) {
+        hit.t.store(&mut self.t[at..]);
+        hit.u.store(&mut self.u[at..]);
+        hit.v.store(&mut self.v[at..]);
+        self.prim[at..at + V::N].copy_from_slice(&hit.prim[..V::N]);
+        self.inst[at..at + V::N].copy_from_slice(&hit.inst[..V::N]);
+    }
+
+    /// Writes the hits to their places in a batch, whose hits are misses so far.
+    #[inline(always)]
+    pub fn scatter(&self, hits: &mut Hits<S>, ids: &[u32]) {
+        for (i, &id) in ids.iter().enumerate().filter(|&(i, _)| self.prim[i] != INVALID_ID) {
+            let id = id as usize;
+            (hits.t[id], hits.u[id], hits.v[id]) = (self.t[i], self.u[i], self.v[i]);
+            (hits.prim[id], hits.inst[id]) = (self.prim[i], self.inst[i]);
+        }
+    }
+
+    /// Writes what any-hit found.
+    #[inline(always)]
+    pub fn scatter_done(&self, out: &mut [u8], ids: &[u32]) {
+        for (i, &id) in ids.iter().enumerate() {
+            out[id as usize] = (self.done >> i & 1) as u8;
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Leaves: a chunk's rays against one block of primitives.
+
+use super::chunk::{Chunk, RAYS};
+use super::walk::Walk;
+use crate::bvh::Child;
+use crate::lanes::{Lanes, Real};
+use crate::ray::{HitPacket, Packet};
+use crate::scene::world::{Class, Object};
+use crate::shape::Triangle;
+use crate::trace::leaf;
+use crate::trace::query::Query;
+
+/// From this many rays in a vector on triangles are tested against it.
+const DENSE: u32 = 5;
+
+/// Tests the block a leaf refers to.
+#[inline(always)]
+pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
+    object: &Object<V::Scalar>,
+    inst: u32,
+    chunk: &Chunk<V::Scalar>,
+    walk: &mut Walk<V::Scalar>,
+    child: Child,
+    rays: u64,
+) {
+    let kernel = |packet: &Packet<V>, query: &mut Query<V, ANY, COUNT>, lanes: u32| {
+        leaf::block(object, inst, packet, query, child, lanes);
+    };
+    if !matches!(Class::ALL[usize::from(child.class)], Class::Triangle) {
+        vectors(chunk, walk, rays, kernel);
+        return;
+    }
+    let mut few = rays;
+    if rays.count_ones() >= DENSE {
+        for at in (0..chunk.len).step_by(V::N) {
+            // A vector tests rays of one dominant axis at once.
+            for dominant in chunk.dominant {
+                let lanes = (rays & dominant) >> at & u64::from(V::ALL);
+                if lanes.count_ones() >= DENSE {
+                    few &= !(lanes << at);
+                    vector(chunk, walk, at, lanes as u32, kernel);
+                }
+            }
+        }
+    }
+    if few != 0 {
+        sparse::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk, child, few);
+    }
+}
+
+/// Runs a packet kernel on the vectors of a chunk that hold some of `rays`.
+#[inline(always)]
+pub fn vectors<V: Lanes, const ANY: bool, const COUNT: bool>(
+    chunk: &Chunk<V::Scalar>,
+    walk: &mut Walk<V::Scalar>,
+    rays: u64,
+    kernel: impl Fn(&Packet<V>, &mut Query<V, ANY, COUNT>, u32),
+) {
+    for at in (0..chunk.len).step_by(V::N) {
+        let lanes = (rays >> at) as u32 & V::ALL;
+        if lanes != 0 {
+            vector(chunk, walk, at, lanes, &kernel);
+        }
+    }
+}
+
+/// Runs a packet kernel on `lanes` of the vector of rays that starts at `at`.
+#[inline(always)]
+fn vector<V: Lanes, const ANY: bool, const COUNT: bool>(
+    chunk: &Chunk<V::Scalar>,
+    walk: &mut Walk<V::Scalar>,
+    at: usize,
+    lanes: u32,
+    kernel: impl Fn(&Packet<V>, &mut Query<V, ANY, COUNT>, u32),
+) {
+    let packet = chunk.packet::<V>(at);
+    let hit: HitPacket<V> = if ANY { HitPacket::new(V::load(&walk.best.t[at..])) } else { walk.best.packet(at) };
+    let mut query = Query::<V, ANY, COUNT>::new(hit, walk.stack, walk.counters);
+    kernel(&packet, &mut query, lanes);
+    let (hit, done) = (query.hit, query.done);
+    if ANY {
+        walk.best.done |= u64::from(done) << at;
+    } else {
+        walk.best.put(at, &hit);
+    }
+}
+
+/// One ray after the other against all triangles of the block.
+#[inline(always)]
+fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
+    object: &Object<S>,
+    inst: u32,
+    chunk: &Chunk<S>,
+    walk: &mut Walk<S>,
+    child: Child,
+    mut rays: u64,
+) {
+    let block = &object.triangles[child.index as usize];
+    let slots = (1 << child.count) - 1;
+    while rays != 0 {
+        let i = rays.trailing_zeros();
+        rays &= rays - 1;
+        let ray = i as usize & (RAYS - 1);
+        let turned = chunk.turned(ray);
+        let mut maybe = slots & Triangle::candidates(&turned, chunk.t_min[ray], walk.best.t[ray], block);
+        if COUNT {
+            walk.counters.leaves += 1;
+            walk.counters.prims += u64::from(child.count);
+            walk.counters.prim_lanes_active += u64::from(child.count);
+            walk.counters.prim_lanes_total += u64::from(child.count);
+        }
+        while maybe != 0 {
+            let slot = maybe.trailing_zeros() as usize & 7;
+            maybe &= maybe - 1;
+            let found = Triangle::look_closer(&chunk.packet::<S>(ray), &turned, &block.get(slot));
+            if !found.hit {
+                continue;
+            }
+            if ANY {
+                if found.t <= walk.best.t[ray] {
+                    walk.best.done |= 1 << i;
+                    break;
+                }
+            } else {
+                let mut hit = walk.best.packet::<S>(ray);
+                hit.commit(1, &found, block.prim[slot], inst);
+                walk.best.put(ray, &hit);
+            }
+        }
+    }
+}

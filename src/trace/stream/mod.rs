@@ -1,0 +1,232 @@
+//! Streams: many rays without a common point through the 8-wide tree together, for what packets are bad at.
+//!
+//! The rays of a batch are sorted by octant and cut into chunks of up to 64. A chunk goes down the tree as one, with a
+//! bit per ray for every box on the stack. At a node few rays are tested one by one against eight boxes, many as vectors
+//! of rays against one box after the other; in both cases a loop of known length replaces the branches of one ray's
+//! own traversal, which are what incoherent rays spend their time on. At a leaf likewise. Vectors of rays that are
+//! coherent after all go to the packet kernel. The kernels and so the hits are those of the other generic engines, bit
+//! by bit.
+//!
+//! Sources: Wald, Gribble, Boulos, Kensler, "SIMD Ray Stream Tracing", 2007; Tsakok, "Faster Incoherent Rays: Multi-BVH
+//! Ray Stream Tracing", 2009; Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray tracing kernels for modern CPU
+//! architectures", 2015.
+
+mod chunk;
+mod leaf;
+mod node;
+mod walk;
+
+use std::marker::PhantomData;
+
+use super::output::Output;
+use super::query::{Query, Stack};
+use super::{Engine, Engines, Scratch, traverse};
+use crate::lanes::{LaneMask, Lanes, Real};
+use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
+use crate::scene::world::World;
+use chunk::{Best, Chunk, RAYS};
+
+/// Rays that are sorted together.
+const SOURCE: usize = 1024;
+
+/// Widest range of the slopes of rays that are traced as a packet.
+const SPREAD: f64 = 0.25;
+
+/// Octants of directions.
+const OCTANTS: usize = 8;
+
+/// Working memory of the engine.
+#[derive(Clone, Debug)]
+pub struct Memory<S> {
+    /// Numbers of the rays of each octant, along each dominant axis.
+    bins: [[Vec<u32>; 3]; OCTANTS],
+    /// Those of one octant, along x, then y, then z.
+    ids: Vec<u32>,
+    chunk: Chunk<S>,
+    /// The chunk in an instance's space.
+    local: Chunk<S>,
+    best: Best<S>,
+    waiting: Vec<walk::Waiting<S>>,
+}
+
+impl<S: Real> Default for Memory<S> {
+    fn default() -> Self {
+        Self {
+            bins: Default::default(),
+            ids: Vec::new(),
+            chunk: Chunk::default(),
+            local: Chunk::default(),
+            best: Best::default(),
+            waiting: Vec::new(),
+        }
+    }
+}
+
+/// The engine; `V`: the vectors of rays.
+#[derive(Clone, Copy, Debug)]
+pub struct Stream<V>(pub PhantomData<fn() -> V>);
+
+/// One call of the engine, or the part of one that another engine leaves to this one.
+pub struct Job<'a, S> {
+    /// What is traced.
+    pub world: &'a World<S>,
+    /// The batch.
+    pub rays: &'a Rays<S>,
+    /// Working memory.
+    pub memory: &'a mut Memory<S>,
+    /// Stack of the packet kernel, with room for this world.
+    pub stack: &'a mut Stack<S>,
+    /// Counters.
+    pub counters: &'a mut Counters,
+    /// Where answers go.
+    pub output: Output<'a, S>,
+}
+
+impl<S: Real> Job<'_, S> {
+    /// Traces the vectors of rays that start at `starts`.
+    pub fn run<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        starts: impl Iterator<Item = usize>,
+    ) {
+        self.memory.waiting.clear();
+        self.memory.waiting.reserve(self.world.stack_bound());
+        let mut sorted = 0;
+        for at in starts {
+            sorted += self.sort::<V, ANY, COUNT>(at);
+            if sorted + V::N > SOURCE {
+                self.sorted::<V, ANY, COUNT>();
+                sorted = 0;
+            }
+        }
+        self.sorted::<V, ANY, COUNT>();
+    }
+
+    /// Traces a vector of coherent rays as a packet, or sorts its live rays by octant and dominant axis. Returns how
+    /// many were sorted.
+    #[inline(always)]
+    fn sort<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
+        let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
+        if COUNT {
+            self.counters.rays += u64::from(live.count_ones());
+        }
+        let backward = packet.rcp.map(|r| r.cmp_lt(V::constant(0.0)).bits());
+        if coherent(&packet, backward, live) {
+            let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
+            if live != 0 {
+                traverse::world(self.world, &packet, &mut query, live);
+            }
+            let (hit, done) = (query.hit, query.done);
+            self.output.put(at, &hit, done);
+            return 0;
+        }
+        self.output.put(at, &HitPacket::<V>::new(t_max), 0);
+        let mut rest = live;
+        while rest != 0 {
+            let lane = rest.trailing_zeros();
+            rest &= rest - 1;
+            let octant = (0..3).fold(0, |o, axis| o | (backward[axis] >> lane & 1) << axis);
+            let axis = (packet.dominant[1] >> lane & 1 | (packet.dominant[2] >> lane & 1) << 1) as usize;
+            self.memory.bins[octant as usize & (OCTANTS - 1)][axis].push(at as u32 + lane);
+        }
+        live.count_ones() as usize
+    }
+
+    /// Traces what was sorted, chunk by chunk.
+    #[inline(always)]
+    fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
+        let Memory { bins, ids, chunk, local, best, waiting } = &mut *self.memory;
+        for (octant, bins) in bins.iter_mut().enumerate() {
+            ids.clear();
+            bins.iter_mut().for_each(|alike| ids.append(alike));
+            let mut rest = &ids[..];
+            while !rest.is_empty() {
+                // Chunks of nearly equal sizes.
+                let (ids, others) = rest.split_at(rest.len().div_ceil(rest.len().div_ceil(RAYS)));
+                rest = others;
+                chunk.gather::<V>(self.rays, ids);
+                best.start(self.rays, ids);
+                let (stack, counters) = (&mut *self.stack, &mut *self.counters);
+                let mut walk = walk::Walk { best: &mut *best, waiting: &mut *waiting, stack, counters };
+                walk.world::<V, ANY, COUNT>(self.world, chunk, local, octant);
+                match &mut self.output {
+                    Output::Closest(hits) => best.scatter(hits, ids),
+                    Output::Any(out) => best.scatter_done(out, ids),
+                }
+            }
+        }
+    }
+}
+
+/// Whether the packet kernel is the better one for these rays: one octant, one dominant axis, nearly one direction.
+#[inline(always)]
+fn coherent<V: Lanes>(packet: &Packet<V>, backward: [u32; 3], live: u32) -> bool {
+    let uniform = backward.iter().all(|bits| bits & live == 0 || bits & live == live);
+    if !uniform || !packet.dominant.iter().any(|bits| bits & live == live) {
+        return false;
+    }
+    let spread = |slope: V| {
+        let (low, high) = slope.range(live);
+        high - low
+    };
+    let most = V::Scalar::from_f64(SPREAD);
+    live == 0 || (spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most)
+}
+
+impl<V: Lanes> Engine<V::Scalar> for Stream<V>
+where
+    V::Scalar: Engines,
+{
+    fn name(&self) -> &'static str {
+        "stream"
+    }
+
+    fn lanes(&self) -> usize {
+        RAYS
+    }
+
+    fn intersect(
+        &self,
+        world: &World<V::Scalar>,
+        rays: &Rays<V::Scalar>,
+        hits: &mut Hits<V::Scalar>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    ) {
+        hits.prepare(rays.len());
+        call::<V, false>(world, rays, Output::Closest(hits), scratch, counters);
+    }
+
+    fn occluded(
+        &self,
+        world: &World<V::Scalar>,
+        rays: &Rays<V::Scalar>,
+        out: &mut Vec<u8>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    ) {
+        out.clear();
+        out.resize(rays.len(), 0);
+        call::<V, true>(world, rays, Output::Any(out), scratch, counters);
+    }
+}
+
+fn call<V: Lanes, const ANY: bool>(
+    world: &World<V::Scalar>,
+    rays: &Rays<V::Scalar>,
+    output: Output<V::Scalar>,
+    scratch: &mut Scratch,
+    counters: Option<&mut Counters>,
+) where
+    V::Scalar: Engines,
+{
+    let super::Memory { stack, stream: memory } = V::Scalar::memory(scratch);
+    stack.reserve(world.stack_bound());
+    let starts = (0..rays.len()).step_by(V::N);
+    match counters {
+        Some(counters) => Job { world, rays, memory, stack, counters, output }.run::<V, ANY, true>(starts),
+        None => {
+            let counters = &mut Counters::default();
+            Job { world, rays, memory, stack, counters, output }.run::<V, ANY, false>(starts);
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! A chunk's way through the trees.
+
+use super::chunk::{Best, Chunk, RAYS};
+use super::{leaf, node};
+use crate::bvh::{Child, Node, Tree};
+use crate::lanes::words::prefetch_either;
+use crate::lanes::{Lanes, Real};
+use crate::ray::Counters;
+use crate::scene::world::{Object, World};
+use crate::trace::leaf as packet_leaf;
+use crate::trace::query::Stack;
+
+/// What waits to be visited: a box and the rays that meet it.
+#[derive(Clone, Copy, Debug)]
+pub struct Waiting<S> {
+    rays: u64,
+    /// Order, and if `bound`, where the first ray enters.
+    near: S,
+    bound: bool,
+    child: Child,
+}
+
+/// The state of a chunk's query.
+pub struct Walk<'a, S> {
+    /// What was found.
+    pub best: &'a mut Best<S>,
+    /// Boxes to visit.
+    pub waiting: &'a mut Vec<Waiting<S>>,
+    /// For kernels that want one.
+    pub stack: &'a mut Stack<S>,
+    /// Counters.
+    pub counters: &'a mut Counters,
+}
+
+impl<S: Real> Walk<'_, S> {
+    /// Traces a chunk of one octant through the whole world. `local` is room for the chunk in an instance's space.
+    pub fn world<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        world: &World<S>,
+        chunk: &Chunk<S>,
+        local: &mut Chunk<S>,
+        octant: usize,
+    ) {
+        let all = u64::MAX >> (RAYS - chunk.len);
+        if world.is_single_object() {
+            let object = &world.objects[world.instances[0].object as usize];
+            self.object::<V, ANY, COUNT>(object, 0, chunk, all, octant);
+            return;
+        }
+        let top = &world.top;
+        let fetch =
+            |child: Child| prefetch_either(&top.nodes, &world.top_blocks, child.is_leaf(), child.index as usize);
+        self.tree::<V, ANY, COUNT>(top, chunk, all, octant, &fetch, |walk, leaf, rays| {
+            for &inst in &world.top_blocks[leaf.index as usize][..usize::from(leaf.count)] {
+                walk.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, rays);
+            }
+        });
+        for &inst in &world.unbounded_instances {
+            self.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, all);
+        }
+    }
+
+    /// Takes some rays into an instance.
+    fn instance<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        world: &World<S>,
+        inst: u32,
+        (chunk, octant): (&Chunk<S>, usize),
+        local: &mut Chunk<S>,
+        rays: u64,
+    ) {
+        let instance = &world.instances[inst as usize];
+        let object = &world.objects[instance.object as usize];
+        if instance.identity {
+            self.object::<V, ANY, COUNT>(object, inst, chunk, rays, octant);
+            return;
+        }
+        let inside = local.enter::<V>(chunk, instance, &self.best.t, rays);
+        for (octant, rays) in local.octants(inside).into_iter().enumerate().filter(|&(_, rays)| rays != 0) {
+            self.object::<V, ANY, COUNT>(object, inst, local, rays, octant);
+        }
+    }
+
+    fn object<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        object: &Object<S>,
+        inst: u32,
+        chunk: &Chunk<S>,
+        rays: u64,
+        octant: usize,
+    ) {
+        if !object.unbounded.is_empty() {
+            leaf::vectors::<V, ANY, COUNT>(chunk, self, rays, |packet, query, lanes| {
+                packet_leaf::unbounded(object, inst, packet, query, lanes);
+            });
+        }
+        let nodes = &object.tree.nodes[..];
+        let fetch = |child: Child| prefetch_either(nodes, &object.triangles, child.is_leaf(), child.index as usize);
+        self.tree::<V, ANY, COUNT>(&object.tree, chunk, rays, octant, &fetch, |walk, child, rays| {
+            leaf::block::<V, ANY, COUNT>(object, inst, chunk, walk, child, rays);
+        });
+    }
+
+    /// Traverses `tree` with some rays of one octant. `fetch` asks the memory for a child.
+    #[inline(always)]
+    fn tree<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        tree: &Tree<S>,
+        chunk: &Chunk<S>,
+        rays: u64,
+        octant: usize,
+        fetch: &impl Fn(Child),
+        mut leaf: impl FnMut(&mut Self, Child, u64),
+    ) {
+        if tree.nodes.is_empty() {
+            return;
+        }
+        let base = self.waiting.len();
+        let (mut child, mut rays) = (Child::ROOT, rays);
+        loop {
+            if ANY {
+                rays &= !self.best.done;
+            }
+            if rays != 0 && !child.is_leaf() {
+                let node = &tree.nodes[child.index as usize];
+                if COUNT {
+                    self.counters.nodes += 1;
+                    self.counters.node_lanes_active += u64::from(rays.count_ones());
+                    self.counters.node_lanes_total += RAYS as u64;
+                }
+                let met = node::meet::<V, ANY>(node, chunk, &self.best.t, rays, octant);
+                if met.children != 0 {
+                    (child, rays) = self.choose::<ANY>(node, &met, fetch);
+                    continue;
+                }
+            } else if rays != 0 {
+                leaf(self, child, rays);
+            }
+            if self.waiting.len() == base {
+                return;
+            }
+            let Some(next) = self.waiting.pop() else { return };
+            (child, rays) = (next.child, next.rays);
+            if !ANY && next.bound {
+                rays &= self.best.reaching::<V>(next.near);
+            }
+        }
+    }
+
+    /// The child to visit next with its rays; the others that are met go to the stack, nearest on top.
+    #[inline(always)]
+    fn choose<const ANY: bool>(&mut self, node: &Node<S>, met: &node::Met<S>, fetch: &impl Fn(Child)) -> (Child, u64) {
+        let entry = |slot: usize| {
+            let child = node.child(slot);
+            fetch(child);
+            Waiting { rays: met.rays[slot], near: met.near[slot], bound: met.bound, child }
+        };
+        let mut rest = met.children;
+        if ANY {
+            // In the node's own order, large children first.
+            while rest & (rest - 1) != 0 {
+                let slot = (31 - rest.leading_zeros()) as usize & 7;
+                rest &= !(1 << slot);
+                self.waiting.push(entry(slot));
+            }
+            let next = entry(rest.trailing_zeros() as usize & 7);
+            return (next.child, next.rays);
+        }
+        let mut best = entry(rest.trailing_zeros() as usize & 7);
+        rest &= rest - 1;
+        let first = self.waiting.len();
+        while rest != 0 {
+            let other = entry(rest.trailing_zeros() as usize & 7);
+            rest &= rest - 1;
+            let nearer = other.near < best.near;
+            let far = if nearer { best } else { other };
+            best = if nearer { other } else { best };
+            self.waiting.push(far);
+            let mut at = self.waiting.len() - 1;
+            while at > first && self.waiting[at - 1].near < far.near {
+                self.waiting[at] = self.waiting[at - 1];
+                at -= 1;
+            }
+            self.waiting[at] = far;
+        }
+        (best.child, best.rays)
+    }
+}

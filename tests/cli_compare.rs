@@ -1,0 +1,141 @@
+//! `lanecast compare` through the real binary: pictures, hits, limits, refusals.
+
+mod binary;
+
+use std::path::Path;
+
+use binary::{SQUARE, lanecast, npy_parts, ray_file, refused};
+use lanecast::film::{Film, PlaneData, exr, npy, png};
+
+fn gray(folder: &Path, name: &str, value: f32) {
+    let mut film = Film::full(16, 12).expect("a size");
+    for plane in ["R", "G", "B"] {
+        film.push(plane, PlaneData::F32(vec![value; 192])).expect("a plane");
+    }
+    let path = folder.join(name);
+    if name.ends_with("png") {
+        png::write(&path, &film, 0.0).expect("written");
+    } else {
+        exr::write(&path, &film, &exr::ImageInfo::default(), exr::Compression::Zip).expect("written");
+    }
+}
+
+fn folder() -> tempfile::TempDir {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str, value: f32| gray(dir.path(), name, value);
+    file("half.exr", 0.5);
+    file("near.exr", 0.5f32.next_up());
+    file("quarter.exr", 0.25);
+    file("half.png", 0.5);
+    file("quarter.png", 0.25);
+    dir
+}
+
+fn run(dir: &tempfile::TempDir, line: &str, code: i32) -> binary::Ended {
+    let ended = lanecast(dir.path(), &line.split(' ').collect::<Vec<_>>());
+    assert_eq!(ended.code, Some(code), "{line}: {}{}", ended.out, ended.err);
+    ended
+}
+
+#[test]
+fn pictures_have_figures_classes_and_maps() {
+    let dir = folder();
+    let report = run(&dir, "compare half.exr quarter.exr -o d.exr -o heat.png --json", 0).json();
+    assert_eq!((report["kind"].as_str(), report["pass"].as_bool()), (Some("pictures"), Some(true)));
+    assert_eq!((report["rmse"].as_f64(), report["peak"].as_f64()), (Some(0.25), Some(0.5)));
+    assert_eq!(report["classes"]["beyond"], 576);
+    assert_eq!(report["planes"][0]["max_ulp"], 1u64 << 23, "from 0.25 to 0.5 the floats double once");
+    let difference = exr::read(&dir.path().join("d.exr")).expect("an EXR");
+    assert_eq!(difference.f32_plane("G").expect("G")[5], -0.25);
+    assert!(difference.f32_plane("flip").expect("flip")[100] > 0.1);
+    let heat = png::read(&dir.path().join("heat.png")).expect("a PNG");
+    assert_eq!((heat.width, heat.height), (16, 12));
+
+    let near = run(&dir, "compare half.exr near.exr --json", 0).json();
+    assert_eq!((near["classes"]["within_one"].as_u64(), near["max_ulp"].as_u64()), (Some(576), Some(1)));
+    let text = run(&dir, "compare half.png half.exr", 0).out;
+    assert!(text.contains("576 matching (100.0000 %)") && text.contains("PSNR       inf dB"), "{text}");
+}
+
+/// BRL-CAD's classes: sRGB levels 188 and 137 are off by many.
+#[test]
+fn levels_have_the_classes_of_pixcmp() {
+    let dir = folder();
+    let report = run(&dir, "compare half.png quarter.png --json", 0).json();
+    assert_eq!((report["unit"].as_str(), report["classes"]["beyond"].as_u64()), (Some("level"), Some(576)));
+    assert!((report["max_error"].as_f64().expect("a number") - 51.0 / 255.0).abs() < 1e-6);
+    let text = run(&dir, "compare half.png quarter.png", 0).out;
+    assert!(text.contains("576 off by many"), "{text}");
+}
+
+#[test]
+fn limits_decide_the_exit_code() {
+    let dir = folder();
+    for (limits, code) in [
+        ("--max-rmse 0.3 --min-psnr 6 --max-flip 1 --max-hdr-flip 1 --max-relmse 0.3 --min-ssim 0", 0),
+        ("--max-rmse 0.2", 1),
+        ("--min-psnr 7", 1),
+        ("--min-ssim 0.999", 1),
+        ("--max-flip 0.01", 1),
+        ("--max-beyond 575", 1),
+        ("--max-ulp 8388608", 0),
+        ("--max-different 0", 1),
+    ] {
+        let ended = run(&dir, &format!("compare half.exr quarter.exr {limits} --json"), code);
+        assert_eq!(ended.json()["pass"], code == 0, "{limits}");
+        assert!(code == 0 || ended.err.contains("beyond"), "{limits}: {}", ended.err);
+    }
+}
+
+#[test]
+fn what_does_not_compare_is_refused() {
+    let dir = folder();
+    let at = dir.path();
+    std::fs::write(at.join("rays.npy"), ray_file(&[[0.0; 8]])).expect("a file");
+    std::fs::write(at.join("cut.pfm"), "PF 2 2 -1\nabc").expect("a file");
+    refused(at, &["compare", "half.exr", "nowhere.exr"], "nowhere.exr");
+    refused(at, &["compare", "half.exr", "cut.pfm"], "byte 10");
+    refused(at, &["compare", "half.exr", "scene.tif"], ".pfm");
+    refused(at, &["compare", "half.png", "half.png", "--map", "hdr-flip", "-o", "a.png"], "linear light");
+    refused(at, &["compare", "half.png", "half.png", "--max-hdr-flip", "1"], "HDR-FLIP");
+    refused(at, &["compare", "half.exr", "half.exr", "-o", "a.jpg"], "a.jpg");
+    let mut film = Film::full(3, 3).expect("a size");
+    film.push("Y", PlaneData::F32(vec![0.0; 9])).expect("a plane");
+    npy::write_plane(&at.join("small.npy"), 3, 3, &film.planes[0].data).expect("written");
+    let sizes = lanecast(at, &["compare", "half.exr", "small.npy"]);
+    assert!(sizes.code == Some(1) && sizes.err.contains("16x12 and 3x3"), "{}", sizes.err);
+}
+
+/// Rays down on a square: hits at t = 1, a miss beside it.
+#[test]
+fn hits_are_judged_by_the_oracle() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let at = dir.path();
+    std::fs::write(at.join("square.ply"), SQUARE).expect("a scene");
+    let ray = |x: f32, y: f32| [x, y, 1.0, 0.0, 0.0, 0.0, -1.0, f32::INFINITY];
+    std::fs::write(at.join("rays.npy"), ray_file(&[ray(0.7, 0.2), ray(0.2, 0.7), ray(3.0, 0.5)])).expect("rays");
+    for (engine, hits) in [("scalar", "a.npy"), ("tile", "b.npy")] {
+        run(&dir, &format!("trace square.ply --rays rays.npy --engine {engine} --hits {hits} --repeat 1"), 0);
+    }
+    let judged = "--scene square.ply --rays rays.npy";
+    let same = run(&dir, &format!("compare a.npy b.npy {judged} --json"), 0).json();
+    assert_eq!(
+        (same["kind"].as_str(), same["rays"].as_u64(), same["differences"].as_u64()),
+        (Some("hits"), Some(3), Some(0))
+    );
+    assert_eq!(same["judged"]["unexplained"], 0);
+
+    // The second ray's t, at byte 20 of the data, becomes 1.5.
+    let mut bytes = std::fs::read(at.join("b.npy")).expect("hits");
+    let start = bytes.len() - npy_parts(&bytes).1.len();
+    bytes[start + 20..start + 24].copy_from_slice(&1.5f32.to_le_bytes());
+    std::fs::write(at.join("wrong.npy"), bytes).expect("hits");
+    let wrong = run(&dir, &format!("compare a.npy wrong.npy {judged} --json"), 1).json();
+    assert_eq!((wrong["differences"].as_u64(), wrong["judged"]["b"]["unexplained"].as_u64()), (Some(1), Some(1)));
+    let unasked = run(&dir, "compare a.npy wrong.npy", 0).out;
+    assert!(unasked.contains("1 beyond rounding") && unasked.contains("ray 1: "), "{unasked}");
+    run(&dir, "compare a.npy wrong.npy --max-beyond 0", 1);
+    refused(at, &["compare", "a.npy", "rays.npy"], "hits");
+    refused(at, &["compare", "a.npy", "b.npy", "-o", "d.exr"], "no pixels");
+    refused(at, &["compare", "a.npy", "b.npy", "--max-rmse", "1"], "--max-beyond");
+}
