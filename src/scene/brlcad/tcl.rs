@@ -188,6 +188,8 @@ impl<'a> Words<'a> {
         let start = self.at;
         while self.at < self.end {
             match self.bytes[self.at] {
+                // A line that goes on in the next one: white space.
+                b'\\' if self.bytes[self.at + 1..self.end].starts_with(b"\n") => break,
                 b'\\' => self.at = (self.at + 2).min(self.end),
                 b'{' | b'}' | b';' if self.at > start => break,
                 b if b.is_ascii_whitespace() => break,
