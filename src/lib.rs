@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | 8 | [`cli`] | arguments, commands, progress, exit codes |
 //! | 7 | [`measure`] | ray sets, timing, statistics, verification, reports |
-//! | 6 | [`render`], [`convert`], [`mod@reference`] | the tile scheduler; solids as meshes and voxels; the f64 oracle (floors 0, 3 and 5 only) |
+//! | 6 | [`render`], [`convert`], [`mod@reference`] | tile scheduler; solids as meshes; the f64 oracle (floors 0, 3, 5) |
 //! | 5 | [`film`], [`shade`] | framebuffer and image files; materials, lights, integrators |
 //! | 4 | [`trace`] | the engines behind one trait |
 //! | 3 | [`scene`], [`camera`] | description, importers, world; cameras, tiles, ray generation |

@@ -1,12 +1,13 @@
 //! Which edges of one cell belong to one piece of the surface.
 //!
-//! Source: G. M. Nielson, "Dual Marching Cubes", 2004: a vertex for each closed loop that the surface's cut with the cell's
-//! faces makes, not one for each cell. Loops come from the faces here, without a table: on each face the crossed edges are
-//! joined in pairs, and a loop is what is joined. A face with four crossed edges can be joined in two ways; which one is
-//! decided face by face, so that both cells at it agree.
+//! Source: G. M. Nielson, "Dual Marching Cubes", 2004: a vertex for each closed loop that the surface's cut with the
+//! cell's faces makes, not one for each cell. Loops come from the faces here, without a table: on each face the
+//! crossed edges are joined in pairs, and a loop is what is joined. A face with four crossed edges can be joined in
+//! two ways; which one is decided face by face, so that both cells at it agree.
 //!
-//! Corner `c` of a cell is at (c & 1, c >> 1 & 1, c >> 2). Edge `4 a + s` runs along axis `a`; bit 0 of `s` is its place on
-//! the axis after `a`, bit 1 on the one after that. Face `2 a + s` is across axis `a`, at its lower (0) or upper end.
+//! Corner `c` of a cell is at (c & 1, c >> 1 & 1, c >> 2). Edge `4 a + s` runs along axis `a`; bit 0 of `s` is its
+//! place on the axis after `a`, bit 1 on the one after that. Face `2 a + s` is across axis `a`, at its lower (0) or
+//! upper end.
 
 /// "No crossing on this edge."
 pub const NONE: u8 = u8::MAX;
@@ -35,8 +36,8 @@ pub fn is_ambiguous(inside: u8, face: usize) -> bool {
     a == c && b == d && a != b
 }
 
-/// The two pairs of edges that an ambiguous face joins: each cuts off an inside corner or, where the face connects its
-/// inside corners, an outside one.
+/// The two pairs of edges that an ambiguous face joins: each cuts off an inside corner or, where the face connects
+/// its inside corners, an outside one.
 pub fn face_pairs(inside: u8, face: usize, connects: bool) -> [[usize; 2]; 2] {
     let (b, c) = ((face / 2 + 1) % 3, (face / 2 + 2) % 3);
     let corners = face_corners(face);
@@ -111,8 +112,8 @@ mod tests {
         assert_eq!(loops(0b0110_1001, 0x3f).1, 4);
     }
 
-    /// Over all corners and all choices: every crossed edge is in a loop, loops have at least three edges, and changing the
-    /// choice on a face that has one loop twice always parts that loop.
+    /// Over all corners and all choices: every crossed edge is in a loop, loops have at least three edges, and
+    /// changing the choice on a face that has one loop twice always parts that loop.
     #[test]
     fn all_cells() {
         for inside in 0..=255u8 {

@@ -19,8 +19,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// A grid around the box `lo..hi` with cells of `spacing`, at least half a cell wider on each side. `shift` (shares of a
-    /// cell, 0..1) moves its planes against the box, whose own faces would otherwise lie in them.
+    /// A grid around the box `lo..hi` with cells of `spacing`, at least half a cell wider on each side. `shift`
+    /// (shares of a cell, 0..1) moves its planes against the box, whose own faces would otherwise lie in them.
     ///
     /// # Errors
     /// More than 65 536 cells along an axis.

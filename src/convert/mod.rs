@@ -1,15 +1,16 @@
 //! Solids as closed triangle meshes and as voxels.
 //!
-//! A uniform grid is laid around the solids; the rays along its lines say where they are inside, with the exact place and
-//! normal of every crossing ([`samples`]). The mesh is the grid's dual: a vertex in each cell the surface passes, at the
-//! point nearest to the tangent planes of the cell's crossings, so that edges and corners stay sharp (T. Ju, F. Losasso,
-//! S. Schaefer, J. Warren, "Dual Contouring of Hermite Data", 2002; [`qef`]), several vertices where several pieces pass
-//! (G. M. Nielson, "Dual Marching Cubes", 2004; [`cell`]), woven to a manifold ([`weave`]). Departures from these: crossings
-//! are exact instead of bisected, faces that would make a mesh meet itself are joined the other way, and quadrilaterals
-//! are cut along the diagonal that is nearer to the true surface.
+//! A uniform grid is laid around the solids; the rays along its lines say where they are inside, with the exact
+//! place and normal of every crossing ([`samples`]). The mesh is the grid's dual: a vertex in each cell the surface
+//! passes, at the point nearest to the tangent planes of the cell's crossings, so that edges and corners stay sharp
+//! (T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data", 2002; [`qef`]), several vertices
+//! where several pieces pass (G. M. Nielson, "Dual Marching Cubes", 2004; [`cell`]), woven to a manifold
+//! ([`weave`]). Departures from these: crossings are exact instead of bisected, faces that would make a mesh meet
+//! itself are joined the other way, and quadrilaterals are cut along the diagonal that is nearer to the true
+//! surface.
 //!
-//! What is thinner than a cell and missed by all lines is lost, and triangles may pass through each other where the surface
-//! turns more than once within a cell. The mesh is closed and a manifold in any case.
+//! What is thinner than a cell and missed by all lines is lost, and triangles may pass through each other where the
+//! surface turns more than once within a cell. The mesh is closed and a manifold in any case.
 
 pub mod grid;
 pub mod select;
@@ -35,9 +36,11 @@ use samples::Samples;
 
 /// Cells along the longest side of the first grid.
 const COARSEST: f64 = 32.0;
-/// Where the grid's planes are between its cells' edges and the box of the solids: no simple fraction, so that flat faces
-/// do not lie in them.
+/// Where the grid's planes are between its cells' edges and the box of the solids: no simple fraction, so that flat
+/// faces do not lie in them.
 const SHIFT: DVec3 = DVec3::new(0.318_309_886, 0.367_879_441, 0.414_213_562);
+/// Shares of a voxel that are rounding.
+const ROUNDING: f64 = 1e-6;
 /// Bytes for a crossed edge: its meeting, up to four cells, vertices, triangles and the lines that measure them.
 const BYTES_PER_MEETING: u64 = 1200;
 
@@ -134,7 +137,8 @@ fn afford(bytes: u64, grid: &Grid, fineness: &Fineness) -> Result<()> {
 /// # Errors
 /// A grid that needs more memory than allowed.
 pub fn voxels(solids: &Solids, spacing: f64, fineness: &Fineness) -> Result<Voxels> {
-    let counts = ((solids.hi - solids.lo) / spacing).ceil().max(DVec3::ONE);
+    // Boxes are a few roundings wider than what is in them.
+    let counts = ((solids.hi - solids.lo) / spacing - ROUNDING).ceil().max(DVec3::ONE);
     let around = Grid::around(solids.lo, solids.hi, spacing, DVec3::ZERO)?;
     afford(around.corner_count() * 2, &around, fineness)?;
     let size = counts.to_array().map(|n| n as usize);

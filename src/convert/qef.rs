@@ -2,18 +2,18 @@
 
 use glam::{DMat3, DVec3};
 
-/// Directions in which the planes' normals spread less than this share of the most (squared) are left to the middle of the
-/// points: on a curved surface they say nothing, an edge of less than about 4 degrees is taken for curved.
+/// Directions in which the planes' normals spread less than this share of the most (squared) are left to the middle
+/// of the points: on a curved surface they say nothing, an edge of less than about 4 degrees is taken for curved.
 const FLAT: f64 = 1e-3;
 /// Points this much outside of the box, in its edges, count as inside.
 const SLACK: f64 = 1e-9;
 
-/// The point in the box `lo..hi` with the least sum of squared distances from the planes `(point, unit normal)`; where they do
-/// not fix it, the one nearest to the middle of their points. If it is outside of the box, the direction that is fixed
-/// least is given up, and so on: a corner, an edge, a surface.
+/// The point in the box `lo..hi` with the least sum of squared distances from the planes `(point, unit normal)`;
+/// where they do not fix it, the one nearest to the middle of their points. If it is outside of the box, the
+/// direction that is fixed least is given up, and so on: a corner, an edge, a surface.
 ///
-/// Source: T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data", 2002, section 2.3; here with the
-/// eigenvectors of the normal equations.
+/// Source: T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data", 2002, section 2.3; here
+/// with the eigenvectors of the normal equations.
 pub fn nearest(planes: &[(DVec3, DVec3)], lo: DVec3, hi: DVec3) -> DVec3 {
     let middle = planes.iter().map(|p| p.0).sum::<DVec3>() / planes.len().max(1) as f64;
     let (mut ata, mut atb) = (DMat3::ZERO, DVec3::ZERO);

@@ -1,8 +1,8 @@
 //! What a grid knows of the solids: which corners are inside, and where its edges meet the surface.
 //!
-//! Corners are decided by the lines along x alone. An edge whose ends differ has a crossing in any case: the one of its line
-//! that turns the right way and is nearest to the edge. So the surface is closed, whatever rounding says about lines that
-//! graze it.
+//! Corners are decided by the lines along x alone. An edge whose ends differ has a crossing in any case: the one of
+//! its line that turns the right way and is nearest to the edge. So the surface is closed, whatever rounding says
+//! about lines that graze it.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -94,7 +94,8 @@ impl Samples {
     }
 }
 
-/// The line along `axis` through corners with numbers `i` and `row` on the axes after it, one cell longer at both ends.
+/// The line along `axis` through corners with numbers `i` and `row` on the axes after it, one cell longer at both
+/// ends.
 fn grid_line(grid: &Grid, axis: usize, i: usize, row: usize) -> Line {
     let mut at = [0; 3];
     (at[(axis + 1) % 3], at[(axis + 2) % 3]) = (i, row);
@@ -129,7 +130,8 @@ fn meeting(
     let (low, high) = ((step + 1) as f64 * grid.spacing, (step + 2) as f64 * grid.spacing);
     let away = |c: &Crossing| (low - c.t).max(c.t - high).max(0.0);
     let best = found.iter().filter(|c| c.enters == enters).min_by(|a, b| away(a).total_cmp(&away(b)));
-    // Without any crossing the line only grazes the surface: then the middle of the edge is as good as any point on it.
+    // Without any crossing the line only grazes the surface: then the middle of the edge is as good as any point on
+    // it.
     let facing = if enters { -DVec3::AXES[axis] } else { DVec3::AXES[axis] };
     let (t, normal) = best.map_or((0.5 * (low + high), facing), |c| (c.t.clamp(low, high), c.normal));
     Meeting { edge, point: line.org + line.dir * t, normal }

@@ -30,11 +30,13 @@ impl Solids {
         let mut met = vec![false; names.len()];
         let mut wanted = |name: &str| {
             let at = names.iter().position(|n| n == name);
-            at.map(|at| met[at] = true);
+            if let Some(at) = at {
+                met[at] = true;
+            }
             names.is_empty() || at.is_some()
         };
-        for group in &mut kept.groups {
-            let whole = wanted(&group.name);
+        let whole = with_children(description, description.groups.iter().map(|g| wanted(&g.name)).collect());
+        for (group, whole) in kept.groups.iter_mut().zip(whole) {
             group.items.retain(|item| match &item.kind {
                 ItemKind::Instance(_) => true,
                 ItemKind::Solids(tree) => wanted(&description.solids[*tree as usize].name) || whole,
@@ -64,6 +66,21 @@ impl Solids {
         };
         Ok(Self { world, lo, hi, left_out })
     }
+}
+
+/// Groups chosen, and all groups that have instances in them.
+fn with_children(description: &Description, mut chosen: Vec<bool>) -> Vec<bool> {
+    let mut open: Vec<usize> = (0..chosen.len()).filter(|&g| chosen[g]).collect();
+    while let Some(group) = open.pop() {
+        for item in &description.groups[group].items {
+            if let ItemKind::Instance(child) = item.kind
+                && !std::mem::replace(&mut chosen[child as usize], true)
+            {
+                open.push(child as usize);
+            }
+        }
+    }
+    chosen
 }
 
 /// The names there are.

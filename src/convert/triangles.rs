@@ -9,8 +9,8 @@ use crate::scene::world::World;
 /// Quadrilaterals flatter than this share of their size have no better diagonal.
 const PLANE: f64 = 1e-9;
 
-/// Triangles, and the largest distances from the surface that were seen. Distances are measured along up to four lines
-/// through each point, so the true ones are not larger.
+/// Triangles, and the largest distances from the surface that were seen. Distances are measured along up to four
+/// lines through each point, so the true ones are not larger.
 #[derive(Debug)]
 pub struct Triangles {
     /// Numbers of vertices, counter-clockwise from outside.

@@ -1,9 +1,10 @@
 //! From samples to a closed, manifold mesh.
 //!
-//! Every loop of every cell (see [`super::cell`]) gets a vertex, every crossed edge of the grid a quadrilateral between the four
-//! cells around it. Such a mesh is a manifold unless two cells share a face on which one and the same loop of both
-//! passes twice; then the face is joined the other way, which parts the loop in both (the idea of R. Wenger,
-//! "Isosurfaces: Geometry, Topology, and Algorithms", 2013, section 3.5). Loops are only ever parted, so one pass is enough.
+//! Every loop of every cell (see [`super::cell`]) gets a vertex, every crossed edge of the grid a quadrilateral
+//! between the four cells around it. Such a mesh is a manifold unless two cells share a face on which one and the
+//! same loop of both passes twice; then the face is joined the other way, which parts the loop in both (the idea of
+//! R. Wenger, "Isosurfaces: Geometry, Topology, and Algorithms", 2013, section 3.5). Loops are only ever parted, so
+//! one pass is enough.
 
 use std::collections::HashSet;
 
@@ -93,8 +94,8 @@ fn active(samples: &Samples) -> Vec<Cell> {
     corners.into_iter().map(cell).collect()
 }
 
-/// The four cells around the edge along `axis` from corner `at`, counter-clockwise seen against the axis, each with the
-/// number of the edge in it.
+/// The four cells around the edge along `axis` from corner `at`, counter-clockwise seen against the axis, each with
+/// the number of the edge in it.
 fn cells_around(axis: usize, at: [usize; 3]) -> [([usize; 3], usize); 4] {
     let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
     // Outermost corners are outside, so a crossed edge has cells on all sides.

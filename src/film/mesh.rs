@@ -1,6 +1,7 @@
 //! Triangle meshes as files: binary STL, OBJ, binary PLY.
 //!
-//! Positions are written as the nearest `f32`; what the mesh was made with is in the comment, cut to the 80 bytes that STL has.
+//! Positions are written as the nearest `f32`; what the mesh was made with is in the comment, cut to the 80 bytes
+//! that STL has.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -127,7 +128,7 @@ mod tests {
             let bytes = std::fs::read(&path).unwrap();
             let back = match kind {
                 MeshKind::Stl => stl::parse(&path, &bytes),
-                MeshKind::Obj => obj::parse(&path, &bytes),
+                MeshKind::Obj => obj::parse(&path, &bytes).map(|file| file.mesh),
                 MeshKind::Ply => ply::parse(&path, &bytes),
             };
             let back = back.unwrap();
