@@ -1,7 +1,7 @@
 //! Constructive solid geometry: solids made of solids, traced by packets.
 //!
-//! [`build`] compiles a program over leaves to [`Solid`]s, each a flat list of leaves, a [`tree`] of operations and
-//! bounds. A packet collects the leaves its lanes meet, [`prune`]s the operations to those that matter, and [`sweep`]s
+//! [`build`] compiles a program over leaves to [`Solid`]s, each a flat list of leaves, a `tree` of operations and
+//! bounds. A packet collects the leaves its lanes meet, `prune`s the operations to those that matter, and [`sweep`]s
 //! the leaves' boundaries. All of it is decided lane by lane, so the bits are the same at every width.
 
 mod build;

@@ -30,7 +30,7 @@ impl Polyhedron {
     /// The polyhedron of some planes, whose normals need not be unit.
     ///
     /// # Errors
-    /// Fewer than four planes or more than [`MAX_PLANES`], numbers that are not finite, nothing inside, or no bounds.
+    /// Fewer than four planes or more than `MAX_PLANES`, numbers that are not finite, nothing inside, or no bounds.
     pub fn from_planes(planes: &[(DVec3, f64)]) -> Result<Self, String> {
         if !(4..=MAX_PLANES).contains(&planes.len()) {
             return Err(format!("it takes 4 to {MAX_PLANES} planes, found {}", planes.len()));
