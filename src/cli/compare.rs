@@ -20,10 +20,11 @@ Examples:
   lanecast compare reference.exr render.exr
   lanecast compare old.png new.png -o heat.png --max-rmse 0.001
   lanecast compare a.exr b.exr -o difference.exr -o flip.png --map hdr-flip --json
+  lanecast compare moss-reference.pix moss.pix
   lanecast compare scalar.npy tile.npy --scene model.ply --rays rays.npy
 
-Pictures: .exr (any channels), .png, .pfm, .npy (height, width[, channels]); A is the reference. Figures of the
-colours are of display values (0 to 1) if a file holds 8-bit levels, else of linear light. Classes count samples
+Pictures: .exr (any channels), .png, .pfm, .npy (height, width[, channels]), .pix (square); A is the reference.
+Figures of the colours are of display values (0 to 1) if a file holds 8-bit levels, else of linear light. Classes count samples
 that are the same, one step apart, or farther; steps are 8-bit levels, or representable floats (ulp).
 Hits: files that `trace --hits` wrote. With --scene and --rays, the f64 oracle judges both answers of every ray
 whose bits differ; a mismatch is explained if the geometry is within a few roundings of the answer.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::metrics::Rgb;
 use super::planes::{COLOR, Film, PlaneData};
-use super::{exr, npy, pfm, png};
+use super::{exr, npy, pfm, pix, png};
 use crate::error::{Error, Result};
 
 /// What the samples of a file mean.
@@ -21,11 +21,12 @@ pub enum Encoding {
 type Reader = fn(&Path) -> Result<Film>;
 
 /// Kinds of files by the end of their name. A further kind is a line here.
-const KINDS: [(&str, Encoding, Reader); 4] = [
+const KINDS: [(&str, Encoding, Reader); 5] = [
     ("exr", Encoding::Linear, exr::read),
     ("png", Encoding::Levels, png::read),
     ("pfm", Encoding::Linear, pfm::read),
     ("npy", Encoding::Linear, npy::read_film),
+    ("pix", Encoding::Levels, pix::read_levels),
 ];
 
 /// A film with what its samples mean.
