@@ -13,7 +13,7 @@ const FLOORS: [&[&str]; 9] = [
     &["scene", "camera"],
     &["trace"],
     &["film", "shade"],
-    &["render", "convert", "reference"],
+    &["render", "reference"],
     &["measure"],
     &["cli"],
 ];
