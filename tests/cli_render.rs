@@ -87,7 +87,7 @@ fn engines_threads_and_precisions_are_chosen() {
 fn refusals_say_what_is_expected() {
     let dir = square();
     for (line, what) in [
-        ("render square.ply -o a.jpg", ".exr, .png or .npy"),
+        ("render square.ply -o a.jpg", ".exr, .png, .npy or .pix"),
         ("render square.ply", "--output"),
         ("render square.ply -o a.exr --integrator normal", "did you mean `normals`?"),
         ("render square.ply -o a.exr --aov M", "unknown AOV `M`"),

@@ -112,7 +112,7 @@ fn errors_leave_no_files() {
     refused(path, &["trace", "none.ply", "--rays", "rays.npy", "--hits", "h.npy"], "none.ply");
     refused(path, &["trace", "square.ply", "--rays", "square.ply", "--hits", "h.npy"], "square.ply");
     refused(path, &["trace", "square.ply", "--rays", "rays.npy", "--hits", "no/such/folder.npy"], "folder.npy");
-    refused(path, &["trace", "square.ply", "--rays", "rays.npy", "--query", "all"], "closest");
+    refused(path, &["trace", "square.ply", "--rays", "rays.npy", "--query", "most"], "closest");
     assert_eq!(files(path), before);
 }
 

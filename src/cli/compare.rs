@@ -4,7 +4,7 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
-use super::common::{OutputArgs, SceneOptions, ThreadArgs, with_pool};
+use super::common::{OutputArgs, SceneOptions, ThreadArgs, size, with_pool};
 use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
 use crate::film::exr::{Compression, ImageInfo};
@@ -20,11 +20,10 @@ Examples:
   lanecast compare reference.exr render.exr
   lanecast compare old.png new.png -o heat.png --max-rmse 0.001
   lanecast compare a.exr b.exr -o difference.exr -o flip.png --map hdr-flip --json
-  lanecast compare moss-reference.pix moss.pix
   lanecast compare scalar.npy tile.npy --scene model.ply --rays rays.npy
 
-Pictures: .exr (any channels), .png, .pfm, .npy (height, width[, channels]), .pix (square); A is the reference.
-Figures of the colours are of display values (0 to 1) if a file holds 8-bit levels, else of linear light. Classes count samples
+Pictures: .exr (any channels), .png, .pfm, .pix, .npy (height, width[, channels]); A is the reference. Figures of the
+colours are of display values (0 to 1) if a file holds 8-bit levels, else of linear light. Classes count samples
 that are the same, one step apart, or farther; steps are 8-bit levels, or representable floats (ulp).
 Hits: files that `trace --hits` wrote. With --scene and --rays, the f64 oracle judges both answers of every ray
 whose bits differ; a mismatch is explained if the geometry is within a few roundings of the answer.
@@ -53,6 +52,9 @@ pub struct CompareArgs {
     /// White of PSNR and SSIM [default: 1 for levels, else the largest value of the reference]
     #[arg(long, value_name = "X", value_parser = positive)]
     peak: Option<f32>,
+    /// Size of .pix pictures that are not square
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<(u32, u32)>,
     /// Pixels per degree of the visual field, for FLIP [default: 67]
     #[arg(long, value_name = "N", value_parser = density)]
     ppd: Option<f64>,
@@ -158,7 +160,7 @@ fn images(args: &CompareArgs) -> Result<()> {
     if args.scene.is_some() {
         return Err(Error::Usage("--scene and --rays are for files of hits".into()));
     }
-    let (a, b) = (picture::read(&args.a)?, picture::read(&args.b)?);
+    let (a, b) = (picture::read(&args.a, args.size)?, picture::read(&args.b, args.size)?);
     let viewing = args.ppd.map_or_else(Viewing::default, |pixels_per_degree| Viewing { pixels_per_degree });
     let options = Options { exposure: args.exposure, peak: args.peak.map(f64::from), viewing };
     let (report, maps) = pictures::compare(&a, &b, &options)?;

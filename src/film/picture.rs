@@ -13,20 +13,25 @@ use crate::error::{Error, Result};
 pub enum Encoding {
     /// Levels of a display (the film holds them decoded to linear light).
     Levels,
+    /// Levels that are linear light times 255, as `.pix` files hold them.
+    PlainLevels,
     /// Linear light, or numbers without a meaning as light.
     Linear,
 }
 
+/// Width and height of a picture whose file does not say them.
+type Size = Option<(u32, u32)>;
+
 /// A reader of one kind of file.
-type Reader = fn(&Path) -> Result<Film>;
+type Reader = fn(&Path, Size) -> Result<Film>;
 
 /// Kinds of files by the end of their name. A further kind is a line here.
 const KINDS: [(&str, Encoding, Reader); 5] = [
-    ("exr", Encoding::Linear, exr::read),
-    ("png", Encoding::Levels, png::read),
-    ("pfm", Encoding::Linear, pfm::read),
-    ("npy", Encoding::Linear, npy::read_film),
-    ("pix", Encoding::Levels, pix::read_levels),
+    ("exr", Encoding::Linear, |path, _| exr::read(path)),
+    ("png", Encoding::Levels, |path, _| png::read(path)),
+    ("pfm", Encoding::Linear, |path, _| pfm::read(path)),
+    ("npy", Encoding::Linear, |path, _| npy::read_film(path)),
+    ("pix", Encoding::PlainLevels, pix::read),
 ];
 
 /// A film with what its samples mean.
@@ -48,17 +53,17 @@ fn kind(path: &Path) -> Option<&'static (&'static str, Encoding, Reader)> {
     KINDS.iter().find(|(name, ..)| *name == end)
 }
 
-/// Reads a picture.
+/// Reads a picture; `size` is that of a file that does not say its own (`.pix`; without it such a file is a square).
 ///
 /// # Errors
 /// Those of its reader; [`Error::Usage`] for a name that no reader knows.
-pub fn read(path: &Path) -> Result<Picture> {
+pub fn read(path: &Path, size: Size) -> Result<Picture> {
     let Some((_, encoding, read)) = kind(path) else {
         let names: Vec<String> = KINDS.iter().map(|(name, ..)| format!(".{name}")).collect();
         let what = format!("{}: expected a picture: a file named {}", path.display(), names.join(", "));
         return Err(Error::Usage(what));
     };
-    Ok(Picture { film: read(path)?, encoding: *encoding })
+    Ok(Picture { film: read(path, size)?, encoding: *encoding })
 }
 
 impl Picture {
@@ -72,11 +77,12 @@ impl Picture {
         Some(Rgb { width: film.window.width() as usize, height: film.window.height() as usize, planes })
     }
 
-    /// The film as 8-bit display levels shows it: one `R G B` (or `R G B A`) list of bytes; see [`png::to_srgb8`].
+    /// The film as 8-bit levels: one `R G B` (or `R G B A`) list of bytes, top row first. Files of levels give their own; linear
+    /// light becomes display levels (see [`png::to_srgb8`]), or with `plain` those of a `.pix` file (see [`pix::level`]).
     ///
     /// # Errors
     /// A picture without colours.
-    pub fn levels(&self, exposure: f32) -> Result<png::Pixels8> {
+    pub fn levels(&self, exposure: f32, plain: bool) -> Result<png::Pixels8> {
         let film = match self.film.color() {
             Ok(_) => Cow::Borrowed(&self.film),
             Err(_) => {
@@ -87,6 +93,11 @@ impl Picture {
                 Cow::Owned(gray)
             }
         };
+        if self.encoding == Encoding::PlainLevels || plain && self.encoding == Encoding::Linear {
+            let (color, gain) = (film.color()?, f64::from(exposure).exp2());
+            let level = |i: usize| color.map(|plane| pix::level(f64::from(plane[i]) * gain));
+            return Ok(png::Pixels8 { channels: 3, bytes: (0..film.pixels()).flat_map(level).collect() });
+        }
         png::to_srgb8(&film, exposure)
     }
 }
@@ -98,8 +109,24 @@ mod tests {
     #[test]
     fn the_name_decides_and_unknown_names_are_refused() {
         assert!(is_named(Path::new("a/b.EXR")) && is_named(Path::new("b.pfm")) && !is_named(Path::new("b.tif")));
-        let fault = read(Path::new("b.tif")).unwrap_err().to_string();
-        assert!(fault.contains("b.tif") && fault.contains(".exr, .png, .pfm, .npy"), "{fault}");
+        let fault = read(Path::new("b.tif"), None).unwrap_err().to_string();
+        assert!(fault.contains("b.tif") && fault.contains(".exr, .png, .pfm, .npy, .pix"), "{fault}");
+    }
+
+    /// A `.pix` file keeps its bytes, and linear light beside it gets plain levels: 0.5 is 128, not 188.
+    #[test]
+    fn plain_levels_stay_plain() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.pix");
+        std::fs::write(&path, [1, 2, 3, 4, 5, 6]).unwrap();
+        let picture = read(&path, Some((1, 2))).unwrap();
+        assert_eq!(picture.levels(0.0, true).unwrap().bytes, [4, 5, 6, 1, 2, 3], "top row first");
+        assert!(read(&path, None).is_err());
+        let mut film = Film::full(1, 1).unwrap();
+        film.push("Y", PlaneData::F32(vec![0.5])).unwrap();
+        let linear = Picture { film, encoding: Encoding::Linear };
+        assert_eq!(linear.levels(0.0, true).unwrap().bytes, [128; 3]);
+        assert_eq!(linear.levels(0.0, false).unwrap().bytes, [188; 3]);
     }
 
     #[test]
@@ -108,8 +135,8 @@ mod tests {
         film.push("Y", PlaneData::F32(vec![0.0, 1.0])).unwrap();
         let picture = Picture { film, encoding: Encoding::Linear };
         assert_eq!(picture.rgb().unwrap().planes[2], [0.0, 1.0]);
-        assert_eq!(picture.levels(0.0).unwrap().bytes, [0, 0, 0, 255, 255, 255]);
+        assert_eq!(picture.levels(0.0, false).unwrap().bytes, [0, 0, 0, 255, 255, 255]);
         let ids = Picture { film: Film::full(1, 1).unwrap(), encoding: Encoding::Linear };
-        assert!(ids.rgb().is_none() && ids.levels(0.0).is_err());
+        assert!(ids.rgb().is_none() && ids.levels(0.0, false).is_err());
     }
 }

@@ -108,10 +108,12 @@ pub fn compare(a: &Picture, b: &Picture, options: &Options) -> Result<(PictureRe
     }
     let (planes, unmatched) = planes(&a.film, &b.film);
     let colors = a.rgb().zip(b.rgb());
-    let domain = if [a, b].iter().any(|p| p.encoding == Encoding::Levels) { Domain::Display } else { Domain::Linear };
+    let any = |encoding| [a, b].iter().any(|p| p.encoding == encoding);
+    let plain = any(Encoding::PlainLevels);
+    let domain = if plain || any(Encoding::Levels) { Domain::Display } else { Domain::Linear };
     let (mut report, mut maps, mut levels) = (None, None, None);
     if let Some((rgb_a, rgb_b)) = colors {
-        let [bytes_a, bytes_b] = [a.levels(options.exposure)?, b.levels(options.exposure)?];
+        let [bytes_a, bytes_b] = [a.levels(options.exposure, plain)?, b.levels(options.exposure, plain)?];
         if bytes_a.channels == bytes_b.channels {
             levels = Some(level_classes(&bytes_a.bytes, &bytes_b.bytes));
         }

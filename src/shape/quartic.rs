@@ -154,7 +154,7 @@ mod tests {
             close(&spans_of::<f64>(with_roots(roots), false), &want, 1e-13);
             close(&spans_of::<f32x8>(with_roots(roots), false), &want, 2e-5);
         }
-        close(&spans_of::<f64>(with_roots([-2.0, 2.0, 3.0, 4.0]), true), &[], 0.0);
+        close(&spans_of::<f64>(with_roots([-0.9, 0.9, 5.0, 6.0]), true), &[[-0.9, 0.9]], 1e-13);
     }
 
     #[test]

@@ -120,7 +120,7 @@ impl Engines for f64 {
             &Generic::<f64x4, true>("packet4", PhantomData),
             &Generic::<f64x8, true>("packet8", PhantomData),
             &Generic::<Pair<f64x8>, true>("packet16", PhantomData),
-            &stream::Stream::<f64x8>(PhantomData),
+            &stream::Stream::<Pair<f64x8>>(PhantomData),
         ]
     }
 

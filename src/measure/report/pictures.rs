@@ -93,7 +93,7 @@ fn shown_path(path: &Path) -> String {
 
 fn single(path: &Path) -> Result<Markup> {
     let name = shown_path(path);
-    let read = picture::read(path).and_then(|picture| data_uri(&picture));
+    let read = picture::read(path, None).and_then(|picture| data_uri(&picture));
     Ok(match read {
         Ok(uri) => html! { figure.single { figcaption { (name) } img alt=(name) src=(uri); } },
         Err(e) => html! { figure { figcaption { (name) } p { "cannot be shown: " (e) } } },
@@ -102,7 +102,7 @@ fn single(path: &Path) -> Result<Markup> {
 
 fn pair(a: &Path, b: &Path) -> Result<Markup> {
     let title = format!("{} and {}", shown_path(a), shown_path(b));
-    let both = picture::read(a).and_then(|a| Ok((a, picture::read(b)?)));
+    let both = picture::read(a, None).and_then(|a| Ok((a, picture::read(b, None)?)));
     let compared = both.and_then(|(a, b)| {
         let (report, maps) = compare(&a, &b, &Options::default())?;
         let maps = maps.ok_or_else(|| Error::Usage("the pictures have no colours".into()))?;
@@ -149,7 +149,7 @@ fn figures(report: &PictureReport) -> Markup {
 }
 
 fn data_uri(picture: &Picture) -> Result<String> {
-    let pixels = picture.levels(0.0)?;
+    let pixels = picture.levels(0.0, false)?;
     let (width, height) = (picture.film.window.width(), picture.film.window.height());
     let rgb = pixels.bytes.chunks_exact(pixels.channels).flat_map(|p| [p[0], p[1], p[2]]).collect();
     encoded(width, height, rgb)

@@ -125,11 +125,16 @@ impl Tree {
     /// Boundaries of the whole on the line of `ray` (object space), in order; those closer than the tree's tolerance
     /// plus `more` (distances in object space) are one.
     pub fn boundaries(&self, ray: &OracleRay, more: f64) -> Vec<Boundary> {
+        self.boundaries_each(ray, more, |_| *ray)
+    }
+
+    /// The same with a ray for each leaf, all of them near `ray` and with its direction.
+    pub fn boundaries_each(&self, ray: &OracleRay, more: f64, own: impl Fn(u32) -> OracleRay) -> Vec<Boundary> {
         let mut inside_of: Vec<(u32, Vec<Span>)> = Vec::new();
         let mut ends: Vec<End> = Vec::new();
         let mut size = ray.org.abs().max_element();
         for leaf in self.met(ray, 0.0) {
-            let spans = self.intervals(leaf, ray);
+            let spans = self.intervals(leaf, &own(leaf));
             let bounds = &self.leaves[leaf as usize].bounds;
             if bounds.is_finite() && !spans.is_empty() {
                 size = size.max(bounds.magnitude().max_element());

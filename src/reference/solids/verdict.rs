@@ -1,8 +1,8 @@
 //! Trees of solids before the judge.
 //!
 //! A tree's answer on a line can change at once where surfaces touch, so it is compared with the answers of *variants* of
-//! the ray: displaced by up to delta (the reach of rounding, as everywhere in this floor), with boundaries closer than up
-//! to [`GROUPING`] delta taken as one, as engines do.
+//! the ray: displaced by up to delta (the reach of rounding, as everywhere in this floor), for all leaves alike or for
+//! each by itself, with boundaries closer than up to [`GROUPING`] delta taken as one, as engines do.
 
 use super::super::judge::{EngineHit, Why};
 use super::super::margin::{Id, Margin};
@@ -14,6 +14,8 @@ use super::{Boundary, Tree, ends};
 const GROUPING: f64 = 4.5;
 /// Directions of displacement, by delta and by half of it.
 const DIRECTIONS: u32 = 16;
+/// Variants in which every leaf sees a displaced ray of its own.
+const SCATTERED: u32 = 48;
 /// Sine of the angle between ray and surface above which t is as certain as the surface.
 const GRAZING: f64 = 1e-3;
 
@@ -104,14 +106,22 @@ impl<'a> Trees<'a> {
         let groupings = [0.0, 0.25, 0.5, 1.0, -0.25, -1.0].map(|f| f * GROUPING * delta * shrink);
         let tree = t.tree;
         let rays = self.displaced(t, delta);
-        groupings.into_iter().flat_map(move |more| {
+        let apart = rays.clone();
+        let together = groupings.into_iter().flat_map(move |more| {
             let rays = rays.clone();
             rays.into_iter().enumerate().map(move |(i, ray)| Variant {
                 boundaries: tree.boundaries(&ray, more),
                 displaced: i > 0,
                 grouped: more != 0.0,
             })
-        })
+        });
+        // Every leaf is rounded by itself: between two that touch, a ray along their common face may miss both.
+        let each = (0..SCATTERED).map(move |pattern| {
+            let own = |leaf: u32| apart[mixed(leaf, pattern) as usize % apart.len()];
+            let more = groupings[pattern as usize % groupings.len()];
+            Variant { boundaries: tree.boundaries_each(&apart[0], more, own), displaced: false, grouped: true }
+        });
+        together.chain(each)
     }
 
     fn along(&self, delta: f64) -> f64 {
@@ -223,6 +233,14 @@ impl<'a> Trees<'a> {
             self.variants(&t, delta).find(touches).map(|v| v.why().unwrap_or(Why::SegmentEnd))
         })
     }
+}
+
+/// A number that looks random (the finaliser of splitmix64: Steele, Lea, Flood, 2014).
+fn mixed(a: u32, b: u32) -> u64 {
+    let mut z = (u64::from(a) << 32 | u64::from(b)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
 }
 
 impl Variant {

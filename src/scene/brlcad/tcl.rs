@@ -115,8 +115,12 @@ impl<'a> Words<'a> {
 
     /// The next element of a list.
     pub fn next(&mut self) -> Result<Option<Word<'a>>> {
-        while self.at < self.end && (self.bytes[self.at].is_ascii_whitespace() || self.bytes[self.at] == 0x0b) {
-            self.at += 1;
+        while self.at < self.end {
+            match self.bytes[self.at] {
+                b'\\' if matches!(self.bytes.get(self.at + 1), Some(b'\n' | b'\r')) => self.at += 2,
+                b if b.is_ascii_whitespace() || b == 0x0b => self.at += 1,
+                _ => break,
+            }
         }
         if self.at >= self.end { Ok(None) } else { self.word().map(Some) }
     }
@@ -188,6 +192,8 @@ impl<'a> Words<'a> {
         let start = self.at;
         while self.at < self.end {
             match self.bytes[self.at] {
+                // A line that goes on in the next one: white space.
+                b'\\' if self.at > start && matches!(self.bytes.get(self.at + 1), Some(b'\n' | b'\r')) => break,
                 b'\\' => self.at = (self.at + 2).min(self.end),
                 b'{' | b'}' | b';' if self.at > start => break,
                 b if b.is_ascii_whitespace() => break,
@@ -220,6 +226,9 @@ mod tests {
 
     #[test]
     fn lists_nest_and_open_braces_are_errors() {
+        let mut words = Words::new(Path::new("f"), b"a\\\n b\\\n");
+        let next = |words: &mut Words| words.next().unwrap().map(|word| word.text().into_owned());
+        assert_eq!([(); 3].map(|()| next(&mut words)), [Some("a".into()), Some("b".into()), None]);
         let mut words = Words::new(Path::new("f"), b"{1 2  {3 4}}");
         let outer = words.next().unwrap().unwrap();
         let mut inner = words.inside(outer);

@@ -114,7 +114,7 @@ pub fn truncated_cone(v: DVec3, h: DVec3, a: DVec3, b: DVec3, c: DVec3, d: DVec3
     let (x, y) = (lc / la, ld / lb);
     let solid = if (x - y).abs() > ALIKE * x.max(y) {
         Solid::Taper { x, y }
-    } else if x >= 1.0 - ALIKE && x <= 1.0 + ALIKE {
+    } else if (1.0 - ALIKE..=1.0 + ALIKE).contains(&x) {
         Solid::Shape(Shape::Cylinder)
     } else {
         Solid::Shape(Shape::Cone { top: x })

@@ -251,8 +251,14 @@ impl<S: Real> Object<S> {
             + self.solids.iter().map(|s| s.solid.bytes()).sum::<usize>()
     }
 
+    /// Whether something in it has no bounds, and so no place in the tree.
+    #[inline(always)]
+    pub fn has_unbounded(&self) -> bool {
+        !self.unbounded.is_empty() || !self.unbounded_solids.is_empty()
+    }
+
     /// Box of everything, infinite with half-spaces.
     pub fn bounds(&self) -> Aabb<S> {
-        if self.unbounded.is_empty() && self.unbounded_solids.is_empty() { self.tree.bounds } else { Aabb::EVERYTHING }
+        if self.has_unbounded() { Aabb::EVERYTHING } else { self.tree.bounds }
     }
 }

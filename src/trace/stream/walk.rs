@@ -89,7 +89,7 @@ impl<S: Real> Walk<'_, S> {
         rays: u64,
         octant: usize,
     ) {
-        if !object.unbounded.is_empty() {
+        if object.has_unbounded() {
             leaf::vectors::<V, ANY, COUNT>(chunk, self, rays, |packet, query, lanes| {
                 packet_leaf::unbounded(object, inst, packet, query, lanes);
             });
