@@ -16,8 +16,8 @@ use brlcad_support::{read_npz, shared};
 const SIDE: u32 = 512;
 /// Of all pixels, how many must agree in hit or miss, region and distance.
 const AGREEMENT: f64 = 0.9995;
-/// In the normal: less. Where boundaries of two solids come within the tolerance, the first of them gives the normal here,
-/// and in librt the one that completes the region.
+/// In the normal: less. Where boundaries of two solids come within the tolerance, the first of them gives the normal
+/// here, and in librt the one that completes the region.
 const NORMALS: f64 = 0.995;
 
 /// What is wrong with a pixel.

@@ -37,8 +37,8 @@ Examples:
   lanecast render m35.asc --az 90 --el 0 --lenient -o front.png
 
 The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as
-float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy), .pix (BRL-CAD's: linear, 8 bits,
-no header). Ctrl-C writes the finished tiles and exits with 130.";
+float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy), .pix (BRL-CAD's: linear,
+8 bits, no header). Ctrl-C writes the finished tiles and exits with 130.";
 
 /// Arguments of `lanecast render`.
 #[derive(Debug, clap::Args)]

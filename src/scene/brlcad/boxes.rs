@@ -11,9 +11,9 @@ type Corners = (DVec3, DVec3);
 const EMPTY: Corners = (DVec3::INFINITY, DVec3::NEG_INFINITY);
 const EVERYTHING: Corners = (DVec3::NEG_INFINITY, DVec3::INFINITY);
 
-/// The box of `region`: of a union both, of an intersection what boxes share, of a difference the first. `solid` gives the
-/// box of solid number i: `None` if it is not there, `Some(None)` if it has no bounds. `None` if the region is empty
-/// or without bounds.
+/// The box of `region`: of a union both, of an intersection what boxes share, of a difference the first. `solid` gives
+/// the box of solid number i: `None` if it is not there, `Some(None)` if it has no bounds. `None` if the region is
+/// empty or without bounds.
 pub(super) fn of_region(region: &PlacedRegion, solid: impl Fn(usize) -> Option<Option<Corners>>) -> Option<Corners> {
     let mut stack = Vec::new();
     for &step in region.expression.steps() {

@@ -9,8 +9,8 @@ use crate::scene::solids::{self, NodeId, NodeKind, Placed, Polyhedron, SolidNode
 /// Points and surfaces nearer than this, mm, are one for BRL-CAD.
 pub(super) const TOLERANCE: f64 = 0.0005;
 
-/// Adds `solid` under `place` to `tree`. What has a form of its own under any affine map is mapped by its parameters, as
-/// BRL-CAD does; the rest is placed.
+/// Adds `solid` under `place` to `tree`. What has a form of its own under any affine map is mapped by its parameters,
+/// as BRL-CAD does; the rest is placed.
 ///
 /// # Errors
 /// In words, what is wrong with the solid's numbers or cannot be done with its kind.

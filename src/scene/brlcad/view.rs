@@ -50,7 +50,8 @@ impl View {
     }
 
     /// `rt`'s own view: from azimuth `az` and elevation `el`, radians, with the box `bounds` (lower and upper corner)
-    /// in sight: it is rounded outwards to whole millimetres, its diagonal is the size, and the eye's plane lies outside.
+    /// in sight: it is rounded outwards to whole millimetres, its diagonal is the size, and the eye's plane lies
+    /// outside.
     pub fn around(bounds: (DVec3, DVec3), az: f64, el: f64) -> Self {
         /// How far the eye stands off, in halves of the size.
         const BACK_OFF: f64 = std::f64::consts::SQRT_2;
@@ -76,8 +77,8 @@ impl View {
 /// Reads the bytes of a view script; `file` is only for error messages.
 ///
 /// # Errors
-/// At line and column: unknown commands, missing or non-finite numbers, a matrix that is no rotation; a script that does
-/// not say size, eye and rotation.
+/// At line and column: unknown commands, missing or non-finite numbers, a matrix that is no rotation; a script that
+/// does not say size, eye and rotation.
 pub fn parse(file: &Path, bytes: &[u8]) -> Result<View> {
     let mut draft = Draft::default();
     let lines = Lines::new(file, bytes);

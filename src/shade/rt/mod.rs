@@ -1,6 +1,6 @@
-//! The lighting model of BRL-CAD's `rt`, so that its benchmark images come out: rays that start on the plane through the
-//! eye, Phong shading with Schlick's highlight, one shadow ray to the middle of each light, mirrors and glass, procedural
-//! colours. Not a model of light: what `rt -B -J0` computes.
+//! The lighting model of BRL-CAD's `rt`, so that its benchmark images come out: rays that start on the plane through
+//! the eye, Phong shading with Schlick's highlight, one shadow ray to the middle of each light, mirrors and glass,
+//! procedural colours. Not a model of light: what `rt -B -J0` computes.
 //!
 //! Source: the behaviour of BRL-CAD 7.32.6 (`rt`, `liboptical`), described in its manual and checked against its own
 //! images. Departures: air has no refraction of its own, glass that touches other glass is left into air, and patterns

@@ -1,7 +1,7 @@
 //! Colours as functions of a surface's parameters: cloud, testmap, checker.
 //!
-//! Source of the clouds: G. Y. Gardner, "Visual Simulation of Clouds", SIGGRAPH 1985, with the constants and the table of
-//! sines that BRL-CAD uses.
+//! Source of the clouds: G. Y. Gardner, "Visual Simulation of Clouds", SIGGRAPH 1985, with the constants and the table
+//! of sines that BRL-CAD uses.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::LazyLock;
