@@ -56,6 +56,10 @@ pub struct Sample {
     pub direct: DVec3,
     /// Material number.
     pub material: u32,
+    /// Of a pixel: variance of the mean brightness, estimated from its samples.
+    pub square: f64,
+    /// Of a pixel: number of samples.
+    pub samples: u32,
     /// Instance number.
     pub inst: u32,
     /// Primitive number.
@@ -77,6 +81,8 @@ impl Sample {
         albedo: DVec3::ZERO,
         direct: DVec3::ZERO,
         material: INVALID_ID,
+        square: 0.0,
+        samples: 0,
         inst: INVALID_ID,
         prim: INVALID_ID,
         nodes: 0.0,
