@@ -31,6 +31,8 @@ pub struct Settings {
     pub seed: u64,
     /// Whether node visits of primary rays are counted (see [`Sample::nodes`]).
     pub cost: bool,
+    /// Whether more is wanted of first hits than radiance and coverage (only paths save the work).
+    pub first_hits: bool,
     /// Whether all engine calls count ([`Workspace::counters`]); counting kernels are slower.
     pub count: bool,
 }
@@ -212,7 +214,7 @@ impl<'a, S: Real> Shader<'a, S> {
         let diagonal = world.bounds().map_or(f64::INFINITY, |(lo, hi)| (hi - lo).length());
         let ao_length = settings.ao_radius * diagonal;
         let paths = (settings.integrator == Integrator::Path)
-            .then(|| Paths::new(world, description, engine, default_light, settings.depth, settings.seed));
+            .then(|| Paths::new(world, description, engine, default_light, &settings));
         let lights = if description.lights.is_empty() { vec![default_light] } else { description.lights.clone() };
         Self {
             world,

@@ -75,6 +75,8 @@ struct Ready {
     back: Look,
     /// Whether a texture changes the look.
     is_textured: bool,
+    /// Whether all points of it look the same from both sides and shine not.
+    is_uniform: bool,
 }
 
 /// The materials of a scene made ready.
@@ -117,6 +119,14 @@ impl<'a> Looks<'a> {
                 if choice < amount { (second, choice / amount) } else { (first, (choice - amount) / (1.0 - amount)) };
         }
         id
+    }
+
+    /// What every point of material `id` scatters with, if that is the same everywhere and from both sides, none
+    /// shines, and no normal map bends the surface.
+    #[inline]
+    pub fn uniform(&self, id: u32) -> Option<&Look> {
+        let ready = &self.entry(id).1;
+        ready.is_uniform.then_some(&ready.front)
     }
 
     /// What material `id` (no mixture) scatters with at `surface`; `from_front`: seen from the side of its normal.
@@ -201,7 +211,14 @@ impl Ready {
     fn new(material: &Material) -> Self {
         let t = &material.textures;
         let is_textured = t.base.is_some() || t.metallic_roughness.is_some() || t.transmission.is_some();
-        Self { front: constant(material, true), back: constant(material, false), is_textured }
+        let is_uniform = !is_textured
+            && t.normal.is_none()
+            && material.emission == DVec3::ZERO
+            && matches!(
+                material.scattering,
+                Scattering::Matte | Scattering::Plastic { .. } | Scattering::MetallicRoughness { .. }
+            );
+        Self { front: constant(material, true), back: constant(material, false), is_textured, is_uniform }
     }
 }
 
