@@ -12,6 +12,7 @@ pub mod load;
 pub mod material;
 pub mod mesh;
 pub mod obj;
+pub mod pictures;
 pub mod ply;
 pub mod reference;
 pub mod solids;
