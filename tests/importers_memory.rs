@@ -141,7 +141,7 @@ fn dense_files_stay_below_the_stated_bounds() {
         (64, "nodes.gltf", gltf_list(SIZE, "", "nodes", "{}")),
         (64, "placed.gltf", gltf_list(SIZE, "\"meshes\": [{}],", "nodes", "{\"mesh\":0}")),
         (64, "groups.gltf", gltf_list(SIZE, "", "nodes", "{\"children\":[]}")),
-        (64, "materials.gltf", gltf_list(SIZE, "", "materials", "{}")),
+        (64, "materials.gltf", gltf_list(SIZE, "", "materials", "{\"doubleSided\":true}")),
         (64, "meshes.gltf", gltf_list(SIZE, "", "meshes", "{}")),
         (64, "names.gltf", gltf_list(SIZE, "", "extensionsUsed", "\"a\"")),
         (64, "strip.glb", strip_glb(SIZE)),

@@ -172,13 +172,14 @@ fn damaged_bytes_end_in_a_picture_or_an_error() {
 fn many_pictures_keep_their_order_and_name_the_first_that_is_wrong() {
     let Some(palette) = file("palette.png") else { return };
     let picture = |content, name: &str| Picture { name: name.into(), content, curve: Curve::Srgb };
-    let mut list: Vec<_> = (0..40).map(|i| picture(Content::Bytes(&palette), &format!("number {i}"))).collect();
+    let mut list: Vec<_> =
+        (0..40).map(|i| picture(Content::Bytes((&palette[..]).into()), &format!("number {i}"))).collect();
     list.push(picture(Content::File(path("grey16.png")), "grey"));
     let all = decode_all(&list).unwrap();
     assert!(all.iter().take(40).enumerate().all(|(i, (t, _))| t.name == format!("number {i}") && t.width == 5));
     assert_eq!((all.len(), all[0].1 == all[39].1, all[0].1 == all[40].1), (41, true, false));
     list[7].content = Content::File(path("none.png"));
-    list[9].content = Content::Bytes(b"");
+    list[9].content = Content::Bytes(Vec::new().into());
     let wrong = decode_all(&list).unwrap_err();
     assert_eq!((wrong.index, wrong.what.starts_with("cannot read it: ")), (7, true), "{wrong:?}");
     assert!(decode_all(&[picture(Content::File(PathBuf::from("/")), "x")]).unwrap_err().what.contains("not a file"));

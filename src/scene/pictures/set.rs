@@ -1,5 +1,6 @@
 //! Many pictures at once: headers first, so that their sum is known, then pixels, both on all threads.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -31,7 +32,7 @@ pub enum Content<'a> {
     /// In a file of its own.
     File(PathBuf),
     /// In a part of another.
-    Bytes(&'a [u8]),
+    Bytes(Cow<'a, [u8]>),
 }
 
 /// A picture that could not be decoded: its index and what is wrong.
