@@ -160,6 +160,22 @@ pub enum Wrap {
     Clamp,
 }
 
+impl Textures {
+    /// All uses of textures, to renumber them.
+    pub fn uses_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
+        let all = [
+            &mut self.base,
+            &mut self.opacity,
+            &mut self.emission,
+            &mut self.metallic_roughness,
+            &mut self.transmission,
+            &mut self.normal,
+            &mut self.occlusion,
+        ];
+        all.into_iter().flatten()
+    }
+}
+
 impl Default for Material {
     fn default() -> Self {
         Self {

@@ -11,6 +11,7 @@ pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
+pub mod mtl;
 pub mod obj;
 pub mod pictures;
 pub mod ply;

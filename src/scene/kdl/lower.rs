@@ -6,13 +6,13 @@ use glam::DAffine3;
 
 use super::cycles::Link;
 use super::fields::{Fields, NO_REST, numbers_of};
-use super::meshes::{Key, MAX_GENERATED, MeshFiles, Store, polygon};
+use super::meshes::{Key, MAX_GENERATED, MeshFile, MeshFiles, Store, add_looks, polygon};
 use super::scope::Scope;
 use super::source::{Span, quote};
 use super::syntax::Node;
 use super::{expression, flake, settings, shapes, solids, terrain, transform, twig};
 use crate::error::{Error, Result};
-use crate::scene::description::{Description, GroupId, Item, ItemKind, MaterialId, Shape};
+use crate::scene::description::{Description, GroupId, Item, ItemKind, Material, MaterialId, Shape};
 
 /// Most items that a document may expand to.
 pub const MAX_ITEMS: usize = 1 << 21;
@@ -291,12 +291,23 @@ impl<'a, 'n> Lowering<'a, 'n> {
                     Error::Io { source: e, .. } => source.error(span, format!("cannot read {}: {e}", quote(written))),
                     other => other,
                 })?;
-                self.store.digests.push(read.digest);
-                self.store.add(Some(key), read.mesh)
+                self.add_mesh(key, &file, read)
             }
         };
         self.store.alias(Key::Written(written.into()), mesh);
         Ok(mesh)
+    }
+
+    /// Stores the mesh of `file` and takes over its materials, unless the scene itself says how they look.
+    fn add_mesh(&mut self, key: Key, file: &std::path::Path, read: MeshFile) -> u32 {
+        let MeshFile { mut mesh, digest, looks } = read;
+        self.store.digests.push(digest);
+        self.store.digests.extend(&looks.digests);
+        let (materials, description) = (&self.materials, &mut self.description);
+        let has_default = description.materials[0] != Material::default();
+        let declared = |name: &str| materials.contains_key(name) && (name != "default" || has_default);
+        add_looks(description, &mut mesh, looks, file, declared);
+        self.store.add(Some(key), mesh)
     }
 
     /// `polygon { point 0 0 0; point 1 0 0; point 0 1 0 }`.

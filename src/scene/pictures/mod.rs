@@ -22,7 +22,7 @@ use self::header::Header;
 use super::texture::Texture;
 
 pub use self::header::{MAX_BYTES, MAX_SIDE, MAX_TEXELS};
-pub use self::set::{Content, MAX_TOTAL, Picture, Unreadable, decode_all};
+pub use self::set::{Content, MAX_TOTAL, Picture, Unreadable, decode_all, is_known};
 
 /// What the levels of an integer picture mean. Pictures of floats hold plain numbers whatever is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

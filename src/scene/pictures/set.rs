@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 
 use super::header::{Header, MAX_BYTES};
-use super::{Curve, decode};
+use super::{Curve, Format, decode};
 use crate::scene::texture::Texture;
 
 /// Most bytes of all textures of a scene together.
@@ -70,6 +70,15 @@ pub fn decode_all(pictures: &[Picture<'_>]) -> Result<Vec<(Texture, [u8; 32])>, 
         .collect();
     let name = |(index, one): (usize, Result<_, String>)| one.map_err(|what| Unreadable { index, what });
     decoded.into_iter().enumerate().map(name).collect()
+}
+
+/// Whether `path` is a file that begins like a picture of a format that is read.
+pub fn is_known(path: &Path) -> bool {
+    const HEAD: u64 = 16;
+    let is_file = path.metadata().is_ok_and(|data| data.is_file());
+    let mut head = Vec::new();
+    let read = |head: &mut Vec<u8>| File::open(path)?.take(HEAD).read_to_end(head);
+    is_file && read(&mut head).is_ok() && Format::of(&head).is_some()
 }
 
 impl Picture<'_> {
