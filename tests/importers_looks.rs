@@ -60,7 +60,8 @@ fn an_obj_file_brings_its_materials_and_textures() {
     assert_eq!(base.wrap, [Wrap::Clamp; 2]);
     // 2 u + 0.5 to the right; 3 v + 0.25 upwards from the lower edge, which is 1 in the picture.
     for (uv, wanted) in [([0.0, 0.0], [0.5, 0.75]), ([1.0, 1.0], [2.5, -2.25])] {
-        assert_eq!(base.transform.transform_point2(DVec2::from(uv)), DVec2::from(wanted));
+        let of_mesh = DVec2::new(uv[0], 1.0 - uv[1]);
+        assert_eq!(base.transform.transform_point2(of_mesh), DVec2::from(wanted));
     }
     let texture = |used: Option<TextureRef>| &scene.textures[used.unwrap().texture as usize];
     assert_eq!(texture(floor.textures.base).texels, Texels::Srgb8(vec![[255, 0, 0, 255], [0, 255, 0, 255]]));

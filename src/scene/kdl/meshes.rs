@@ -96,10 +96,12 @@ impl Store {
     }
 }
 
-/// The polygon with corners `positions`, fanned from its first corner.
-pub fn polygon(positions: Vec<glam::DVec3>) -> Mesh {
+/// The polygon with corners `positions`, fanned from its first corner, with texture coordinates if there are any.
+pub fn polygon(positions: Vec<glam::DVec3>, uvs: Vec<[f32; 2]>) -> Mesh {
     let triangles = (2..positions.len() as u32).map(|i| [0, i - 1, i]).collect();
-    Mesh { positions, triangles, groups: Vec::new(), ..Mesh::default() }
+    let mut mesh = Mesh { positions, triangles, ..Mesh::default() };
+    mesh.uvs[0].values = uvs;
+    mesh
 }
 
 /// Adds the materials and textures of `file`, whose mesh is `mesh`. Those that `declared` knows by name look as the

@@ -150,10 +150,10 @@ impl Reader<'_> {
             return None;
         }
         let id = images.add(path, &map.file, usage);
-        // OBJ's v points up, and 0 is the picture's lower edge.
+        // The format's v points up, the mesh's and the picture's down.
         let [u, v] = map.scale;
-        let offset = DVec2::new(map.offset[0], 1.0 - map.offset[1]);
-        let transform = DAffine2::from_mat2_translation(DMat2::from_diagonal(DVec2::new(u, -v)), offset);
+        let offset = DVec2::new(map.offset[0], 1.0 - v - map.offset[1]);
+        let transform = DAffine2::from_mat2_translation(DMat2::from_diagonal(DVec2::new(u, v)), offset);
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
         Some(TextureRef { transform, wrap: [wrap; 2], ..TextureRef::new(id) })
     }

@@ -158,7 +158,8 @@ impl Body {
                 self.mesh.normals.values.push([nx, ny, nz].map(|n| n as f32));
             }
             if has_uvs {
-                self.mesh.uvs[0].values.push([u as f32, v as f32]);
+                // A picture's v points down in a mesh, a file's up.
+                self.mesh.uvs[0].values.push([u as f32, 1.0 - v as f32]);
             }
         }
         Ok(())

@@ -225,7 +225,7 @@ fn normals_and_coordinates_in_any_order_and_only_in_full() {
     let mesh = read(format!("{head}6 1 8 2 3 7 4 5\n0 0 0.5 0 0 1 0 0\n"));
     assert_eq!(mesh.positions, [DVec3::new(1., 2., 3.), DVec3::ZERO]);
     assert_eq!(mesh.normals.values, [[4.0, 5.0, 6.0], [0.0; 3]]);
-    assert_eq!(mesh.uvs[0].values, [[7.0, 8.0], [1.0, 0.5]]);
+    assert_eq!(mesh.uvs[0].values, [[7.0, -7.0], [1.0, 0.5]]);
     let half =
         read(format!("{}6 1 8 2 3 7 4 5\n0 0 0.5 0 0 1 0 0\n", head.replace(" ny", " red").replace(" s\n", " q\n")));
     assert!(half.normals.values.is_empty() && half.uvs[0].values.is_empty());
