@@ -37,7 +37,7 @@ pub struct Lights<'a> {
 impl<'a> Lights<'a> {
     /// The lights of `description` and the emitting surfaces of `world`; where nothing shines, a sky of radiance 1 in
     /// all directions.
-    pub fn new<S: Real>(world: &World<S>, description: &'a Description, looks: &Looks<'_>, headlight: Light) -> Self {
+    pub fn new<S: Real>(world: &World<S>, description: &'a Description, looks: &Looks<'_>) -> Self {
         let (runs, first, mut emitters) = surfaces(world, looks);
         emitters.extend(description.lights.iter().map(|&light| Emitter::Light(light)));
         let is_dark = emitters.is_empty() && description.environment.is_none() && description.background == DVec3::ZERO;
