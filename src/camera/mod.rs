@@ -5,9 +5,11 @@ mod generate;
 mod matrices;
 mod model;
 pub mod sampling;
+mod scattered;
 mod tiles;
 
 pub use framing::framing;
 pub use generate::{SubPixel, fill_tile};
 pub use model::{Camera, CameraOverrides};
+pub use scattered::fill_pixels;
 pub use tiles::{FILE_TILE, PixelRect, Tiling, morton_decode, morton_encode};
