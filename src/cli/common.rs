@@ -33,6 +33,11 @@ impl Default for EngineArgs {
 }
 
 impl EngineArgs {
+    /// The same, but for pictures by blocks: unless an engine is named, one that knows nothing of a ray's neighbours.
+    pub fn for_blocks(&self, by_blocks: bool) -> Self {
+        Self { exact: self.exact || by_blocks && self.engine == DEFAULT_ENGINE, ..self.clone() }
+    }
+
     /// The engine asked for.
     ///
     /// # Errors

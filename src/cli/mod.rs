@@ -10,6 +10,7 @@ mod info;
 mod interrupt;
 mod isa;
 mod picture;
+mod preview;
 mod rays;
 mod render;
 mod report;

@@ -110,14 +110,10 @@ mod tests {
         // Row of the window: dx = 0..8 belong to the first block of 8; the block of 4 at dx = 4 is set.
         let at = |x: u32, y: u32| frame.shown(x, y).map(|i| frame.film().f32_plane("R").unwrap()[i]);
         assert_eq!([at(3, 5), at(6, 12), at(7, 5), at(10, 8)], [Some(1.0), Some(1.0), Some(2.0), Some(2.0)]);
-        assert_eq!([at(8, 6), at(9, 6), at(11, 5), at(3, 13), at(12, 5), at(2, 5)], [
-            Some(3.0),
-            Some(2.0),
-            None,
-            None,
-            None,
-            None
-        ]);
+        assert_eq!(
+            [at(8, 6), at(9, 6), at(11, 5), at(3, 13), at(12, 5), at(2, 5)],
+            [Some(3.0), Some(2.0), None, None, None, None]
+        );
         assert!(frame.is_set(8, 6) && !frame.is_set(9, 6) && !frame.is_set(0, 0));
         assert_eq!(frame.left(), 78);
         let red = frame.into_film();

@@ -194,6 +194,11 @@ impl<'a, S: Real> Progressive<'a, S> {
         finished
     }
 
+    /// Looks at the picture between runs.
+    pub fn look<R>(&self, eye: impl FnOnce(&Framebuffer) -> R) -> R {
+        eye(&locked(&self.frame))
+    }
+
     /// The picture as it is.
     pub fn finish(self) -> RenderOutput {
         RenderOutput {
