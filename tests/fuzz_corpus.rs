@@ -96,3 +96,11 @@ fn experiment_corpus() {
         assert_eq!(accepted, name != "misspelt.kdl", "{name}");
     }
 }
+
+#[test]
+fn script_corpus() {
+    let parse = |file: &Path, bytes: &[u8]| lanecast::view::script::parse(file, bytes).is_ok();
+    for (name, accepted) in verdicts("script", parse).into_iter().filter(|(name, _)| name.contains('.')) {
+        assert_eq!(accepted, name != "nan.txt" && name != "more.txt", "{name}");
+    }
+}
