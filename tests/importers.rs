@@ -93,7 +93,7 @@ fn grid(side: u32) -> Mesh {
     let positions = (0..row * row).map(|i| DVec3::new(f64::from(i % row), f64::from(i / row), height(i))).collect();
     let corners = (0..side * side).map(|q| q / side * row + q % side);
     let triangles = corners.flat_map(|a| [[a, a + 1, a + row], [a + 1, a + row + 1, a + row]]).collect();
-    Mesh { positions, triangles, groups: Vec::new() }
+    Mesh { positions, triangles, groups: Vec::new(), ..Mesh::default() }
 }
 
 fn write_obj(mesh: &Mesh) -> Vec<u8> {

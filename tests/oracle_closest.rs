@@ -57,6 +57,7 @@ fn ties_go_to_the_smaller_instance_then_primitive() {
         positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
         triangles: vec![[0, 0, 1], [0, 1, 2], [0, 1, 2], [1, 2, 0]],
         groups: vec![],
+        ..Mesh::default()
     };
     let item = |kind| Item { transform: DAffine3::IDENTITY, material: None, kind };
     let root = vec![item(ItemKind::Instance(1)), item(ItemKind::Instance(1)), item(ItemKind::Instance(1))];

@@ -60,7 +60,7 @@ fn quad_and_wall() -> Oracle {
     let mut positions = vec![corner(0., 0., 0.), corner(1., 0., 0.), corner(1., 1., 0.), corner(0., 1., 0.)];
     positions.extend([corner(-9., -9., -1.), corner(9., -9., -1.), corner(9., 9., -1.), corner(-9., 9., -1.)]);
     let triangles = vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
-    Oracle::new(&mesh_scene(Mesh { positions, triangles, groups: vec![] }))
+    Oracle::new(&mesh_scene(Mesh { positions, triangles, groups: vec![], ..Mesh::default() }))
 }
 
 #[test]
@@ -191,7 +191,12 @@ fn segment_ends_coincident_surfaces_and_borders() {
     fault(sphere.judge(&inwards, None, F32));
     fault(sphere.judge_occluded(&inwards, false, F32));
     // The same triangle twice as two instances: either is right, a third one a little behind is not.
-    let mesh = Mesh { positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y], triangles: vec![[0, 1, 2]], groups: vec![] };
+    let mesh = Mesh {
+        positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+        triangles: vec![[0, 1, 2]],
+        groups: vec![],
+        ..Mesh::default()
+    };
     let place = |z: f64| {
         let transform = DAffine3::from_translation(DVec3::Z * z);
         Item { transform, material: None, kind: ItemKind::Instance(1) }

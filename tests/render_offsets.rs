@@ -116,7 +116,9 @@ fn large_squares_are_open<S: Engines>() {
             let corner = |x: f64, y: f64| turn * DVec3::new(x * size, y * size, 0.0);
             let positions = vec![corner(-1.0, -1.1), corner(1.3, -1.0), corner(1.0, 1.0), corner(-1.0, 1.2)];
             let mut d = Description::new("square");
-            d.meshes.push(Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], groups: Vec::new() }.into());
+            d.meshes.push(
+                Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], groups: Vec::new(), ..Mesh::default() }.into(),
+            );
             d.groups[0].items.push(item(DAffine3::IDENTITY, ItemKind::Mesh(0)));
             let (eye, look_at) = (turn * DVec3::new(0.3, 0.2, height), turn * DVec3::new(0.35, 0.1, 0.0));
             let projection = Projection::Perspective { theta: 1.0 };

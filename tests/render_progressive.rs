@@ -84,7 +84,8 @@ fn cases() -> impl Strategy<Value = (RenderOptions, u32, usize, u64)> {
     let size = prop_oneof![Just((1, 1)), Just((17, 31)), (1..90u32, 1..90u32)];
     let names = ENGINES.to_vec();
     size.prop_flat_map(move |(width, height)| {
-        let look = proptest::sample::select(vec![Integrator::Whitted, Integrator::Ao, Integrator::Cost]);
+        let look =
+            proptest::sample::select(vec![Integrator::Whitted, Integrator::Ao, Integrator::Cost, Integrator::Path]);
         let numbers = (1..5u32, any::<u64>(), proptest::sample::select(vec![8, 16, 32]), 0..400u64);
         let start = proptest::sample::select(vec![1, 2, 4, 8, 16]);
         let engine = proptest::sample::select(names.clone());

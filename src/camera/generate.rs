@@ -3,8 +3,10 @@
 //! A pixel's ray is a function of camera, picture size, pixel and sample alone: f64 arithmetic in one fixed order,
 //! rounded once to the engine's precision. Tile size, crop and thread do not enter.
 
+use super::filter::Filter;
 use super::model::Camera;
 use super::sampling::PixelRandom;
+use super::sobol::PixelPoints;
 use super::tiles::{FILE_TILE, PixelRect, Tiling, morton_decode};
 use crate::lanes::Real;
 use crate::ray::Rays;
@@ -26,6 +28,15 @@ pub enum SubPixel {
         /// Seed of the picture.
         seed: u64,
     },
+    /// Where a filter puts point `sample` of the pixel's Sobol points.
+    Filtered {
+        /// Number of the sample.
+        sample: u32,
+        /// Seed of the picture.
+        seed: u64,
+        /// The filter.
+        filter: Filter,
+    },
 }
 
 impl SubPixel {
@@ -34,6 +45,9 @@ impl SubPixel {
         match self {
             Self::Anchor => anchor,
             Self::Sample { sample, seed } => PixelRandom::new(x, y, seed).spread(sample, DIMENSION),
+            Self::Filtered { sample, seed, filter } => {
+                PixelPoints::new(x, y, seed).point(sample, DIMENSION).map(|u| 0.5 + filter.place(u))
+            }
         }
     }
 }

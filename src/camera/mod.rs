@@ -1,13 +1,16 @@
 //! Cameras, the order of pixels in tiles, primary rays and the random numbers that place samples.
 
+mod filter;
 mod framing;
 mod generate;
 mod matrices;
 mod model;
 pub mod sampling;
 mod scattered;
+pub mod sobol;
 mod tiles;
 
+pub use filter::Filter;
 pub use framing::framing;
 pub use generate::{SubPixel, fill_tile};
 pub use model::{Camera, CameraOverrides};

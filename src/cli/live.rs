@@ -19,6 +19,7 @@ use crate::scene::world::World;
 use crate::shade::Integrator;
 use crate::trace::{EXACT_ENGINE, Engines};
 use crate::view::action::View;
+use crate::view::meshes::Meshes;
 use crate::view::reload::Source;
 use crate::view::script;
 use crate::view::stage::{Look, Scene, Stage};
@@ -108,8 +109,9 @@ fn read_script(path: &Path) -> Result<Vec<u8>> {
 fn source(args: &SceneArgs) -> Result<Source> {
     let (name, options) = (args.scene.clone(), args.options.clone());
     let file = (!name.starts_with("builtin:")).then(|| PathBuf::from(&name));
+    let meshes = Meshes::default();
     let open = move |before: Option<&dyn Stage>| {
-        let description = options.load(&name)?;
+        let description = options.load_with(&name, &|path| meshes.read(path))?;
         if before.is_some_and(|before| before.description().hash == description.hash) {
             return Ok(None);
         }
@@ -124,12 +126,13 @@ fn source(args: &SceneArgs) -> Result<Source> {
 fn stage<S: Engines>(
     options: &SceneOptions,
     description: Description,
-    _before: Option<&dyn Stage>,
+    before: Option<&dyn Stage>,
 ) -> Result<Option<Arc<dyn Stage>>>
 where
     World<S>: Send + Sync,
 {
-    let world = World::<S>::compile(&description, options.preset())?;
+    let before = before.and_then(|before| before.as_any().downcast_ref::<World<S>>());
+    let world = World::<S>::compile_after(&description, options.preset(), before)?;
     Ok(Some(Arc::new(Scene { description, world })))
 }
 

@@ -1,28 +1,36 @@
 //! `lanecast render`: a picture of a scene.
 
+mod report;
+
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use indicatif::ProgressBar;
-use serde::Serialize;
-
+use self::report::{Made, report, tell};
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
-use super::output::json_to_stdout;
 use super::picture::{Format, Target, target, write};
 use super::preview::{Job, PreviewArgs};
+use crate::camera::Filter;
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::exr::ImageInfo;
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
-use crate::render::{Aov, Progress, RenderOptions, RenderOutput};
+use crate::render::{Aov, Progress, RenderOptions};
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
 use crate::shade::{Integrator, unknown_shaders};
 use crate::trace::Engines;
+use indicatif::ProgressBar;
 
 /// Picture size unless `--size` says otherwise.
 const DEFAULT_SIZE: (u32, u32) = (960, 540);
+
+/// Samples per pixel of path tracing unless `--spp` says otherwise.
+const PATH_SAMPLES: u32 = 64;
+/// Scatterings of a path unless `--depth` says otherwise.
+const PATH_DEPTH: u32 = 16;
+/// Samples per pixel at most where time or noise decides.
+const MOST_SAMPLES: u32 = 1 << 16;
 
 /// The same with `--rt-compat`.
 const RT_SIZE: (u32, u32) = (512, 512);
@@ -56,28 +64,41 @@ pub struct RenderArgs {
     /// Part of the picture to render, pixels, y down, half open
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = crop, help_heading = "Camera")]
     crop: Option<Window>,
-    /// What to show: whitted, ao, normals, depth, cost or rt (as --rt-compat)
+    /// What to show: whitted, path (all light), ao, normals, depth, cost or rt (as --rt-compat)
     #[arg(long, value_name = "NAME", default_value = Integrator::Whitted.name())]
     integrator: Integrator,
     /// Show a BRL-CAD database as BRL-CAD's own `rt -B -J0` does: its shaders, lights, default view and 512x512 pixels
     #[arg(long)]
     rt_compat: bool,
-    /// Samples per pixel
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    spp: u32,
+    /// Samples per pixel [default: 1; 64 with path, as many as needed with --time-limit or --noise]
+    #[arg(long, value_name = "N")]
+    spp: Option<u32>,
+    /// Stop adding samples after that many seconds
+    #[arg(long, value_name = "SECONDS")]
+    time_limit: Option<f64>,
+    /// Stop adding samples to a tile when its relative error is estimated below this, for example 0.02
+    #[arg(long, value_name = "ERROR")]
+    noise: Option<f64>,
+    /// How samples are placed around a pixel's centre: box, tent or blackman-harris
+    #[arg(long, value_name = "NAME", default_value = Filter::Box.name())]
+    filter: Filter,
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Mirror reflections followed
-    #[arg(long, value_name = "N", default_value_t = 4)]
-    depth: u32,
+    /// Mirror reflections followed [default: 4]; scatterings of a path [default: 16]
+    #[arg(long, value_name = "N")]
+    depth: Option<u32>,
+    /// Print rays and time of each bounce of the paths
+    #[arg(long)]
+    stats: bool,
     /// Occlusion rays per hit
     #[arg(long, value_name = "N", default_value_t = 16)]
     ao_samples: u32,
     /// Length of occlusion rays as a fraction of the scene's diagonal
     #[arg(long, value_name = "FRACTION", default_value_t = 0.2, allow_negative_numbers = true)]
     ao_radius: f64,
-    /// Extra planes: Z, N, albedo, id.instance, id.primitive, cost.nodes, or all
+    /// Extra planes: Z, N, Ns, P, albedo, direct, indirect, id.instance, id.primitive, id.material, variance, samples,
+    /// cost.nodes, or all
     #[arg(long, value_name = "LIST", default_value = "")]
     aov: String,
     /// Brightness of PNG and .pix files: colours times 2^STOPS
@@ -94,38 +115,6 @@ pub struct RenderArgs {
     threads: ThreadArgs,
     #[command(flatten)]
     pub(super) output: OutputArgs,
-}
-
-/// The object of `--json`.
-#[derive(Serialize)]
-struct Report<'a> {
-    scene: &'a str,
-    file: String,
-    size: (u32, u32),
-    window: (u32, u32, u32, u32),
-    planes: Vec<&'a str>,
-    integrator: &'static str,
-    engine: &'static str,
-    precision: &'static str,
-    isa: &'static str,
-    threads: usize,
-    spp: u32,
-    seed: u64,
-    complete: bool,
-    tiles: (u64, u64),
-    rays: Rays,
-    build_seconds: f64,
-    seconds: f64,
-    mrays_per_s: f64,
-}
-
-#[derive(Serialize)]
-struct Rays {
-    primary: u64,
-    shadow: u64,
-    occlusion: u64,
-    mirror: u64,
-    total: u64,
 }
 
 /// A bar that shows tiles, and Ctrl-C.
@@ -154,9 +143,13 @@ impl RenderArgs {
             crop: None,
             integrator: Integrator::Whitted,
             rt_compat: false,
-            spp: 1,
+            spp: Some(1),
+            time_limit: None,
+            noise: None,
+            filter: Filter::Box,
             seed: 0,
-            depth: 4,
+            depth: None,
+            stats: false,
             ao_samples: 16,
             ao_radius: 0.2,
             aov: "all".into(),
@@ -219,16 +212,27 @@ fn check_rt(args: &RenderArgs, description: &Description) -> Result<()> {
 /// The options, checked before a long build starts.
 fn options(args: &RenderArgs) -> Result<RenderOptions> {
     let (width, height) = args.camera.size.unwrap_or(if args.rt_compat { RT_SIZE } else { DEFAULT_SIZE });
+    let integrator = if args.rt_compat { Integrator::Rt } else { args.integrator };
+    let is_path = integrator == Integrator::Path;
+    let spp = match args.spp {
+        Some(spp) => spp,
+        None if args.time_limit.is_some() || args.noise.is_some() => MOST_SAMPLES,
+        None if is_path => PATH_SAMPLES,
+        None => 1,
+    };
     let options = RenderOptions {
         width,
         height,
         crop: args.crop,
-        spp: args.spp,
+        spp,
+        filter: args.filter,
+        time_limit: args.time_limit,
+        noise: args.noise,
         seed: args.seed,
-        integrator: if args.rt_compat { Integrator::Rt } else { args.integrator },
+        integrator,
         engine: args.engine.engine.clone(),
         tile: args.tile,
-        depth: args.depth,
+        depth: args.depth.unwrap_or(if is_path { PATH_DEPTH } else { 4 }),
         ao_samples: args.ao_samples,
         ao_radius: args.ao_radius,
         aovs: Aov::parse_list(&args.aov)?,
@@ -282,68 +286,6 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
     let made = Made { engine: engine.name(), precision: S::PRECISION, build_seconds: world.stats().build_seconds };
     tell(args, &report(args, options, &output, &made), &output)?;
     if output.is_complete() { Ok(()) } else { Err(Error::Interrupted) }
-}
-
-/// What made a picture.
-struct Made {
-    engine: &'static str,
-    precision: &'static str,
-    build_seconds: f64,
-}
-
-fn report<'a>(args: &'a RenderArgs, options: &RenderOptions, output: &'a RenderOutput, made: &Made) -> Report<'a> {
-    let (film, rays) = (&output.film, output.rays);
-    Report {
-        scene: &args.scene.scene,
-        file: args.file.path.display().to_string(),
-        size: (film.width, film.height),
-        window: (film.window.x0, film.window.y0, film.window.x1, film.window.y1),
-        planes: film.planes.iter().map(|plane| plane.name.as_str()).collect(),
-        integrator: options.integrator.name(),
-        engine: made.engine,
-        precision: made.precision,
-        isa: compiled_isa(),
-        threads: rayon::current_num_threads(),
-        spp: options.spp,
-        seed: options.seed,
-        complete: output.is_complete(),
-        tiles: (output.tiles_done, output.tiles_total),
-        rays: Rays {
-            primary: rays.primary,
-            shadow: rays.shadow,
-            occlusion: rays.occlusion,
-            mirror: rays.mirror,
-            total: rays.total(),
-        },
-        build_seconds: made.build_seconds,
-        seconds: output.seconds,
-        mrays_per_s: rays.total() as f64 / output.seconds.max(f64::MIN_POSITIVE) / 1e6,
-    }
-}
-
-/// What was done: one JSON object on stdout, or a few lines on stderr.
-fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput) -> Result<()> {
-    let (file, (width, height), rays) = (&report.file, report.size, &report.rays);
-    let (done, total) = report.tiles;
-    let part = match (report.complete, done) {
-        (true, _) => String::new(),
-        (false, 0) => format!(", none of {total} tiles was finished, nothing is written"),
-        (false, _) => format!(", only {done} of {total} tiles"),
-    };
-    args.output.say(&format!(
-        "{file}: {width}x{height}{part}, {} rays in {:.3} s with {} ({:.1} Mrays/s, shading included)",
-        rays.total, report.seconds, report.engine, report.mrays_per_s
-    ));
-    args.output.detail(&format!(
-        "rays: {} primary, {} shadow, {} occlusion, {} mirror; build {:.3} s",
-        rays.primary, rays.shadow, rays.occlusion, rays.mirror, report.build_seconds
-    ));
-    let c = &output.counters;
-    args.output.detail(&format!(
-        "visits: {} nodes, {} leaves, {} primitive tests (counting kernels)",
-        c.nodes, c.leaves, c.prims
-    ));
-    if args.output.json { json_to_stdout(report) } else { Ok(()) }
 }
 
 fn crop(text: &str) -> std::result::Result<Window, String> {

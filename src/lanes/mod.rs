@@ -16,6 +16,7 @@ mod ftz;
 mod isa;
 mod pair;
 mod scalar;
+pub mod space;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 mod startup;
 mod vector;
@@ -128,6 +129,8 @@ pub trait Real:
 {
     /// Eight lanes of this scalar: what an 8-wide node is tested with.
     type Octo: Lanes<Scalar = Self>;
+    /// The widest vector of this scalar that fills 64 bytes: what shading computes in.
+    type Wide: Lanes<Scalar = Self>;
     /// Half the distance from 1 to the next larger number.
     const EPSILON: Self;
     /// Smallest positive normal number.

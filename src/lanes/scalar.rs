@@ -18,7 +18,7 @@ impl LaneMask for bool {
 }
 
 macro_rules! scalar_lanes {
-    ($t:ident, $octo:ident) => {
+    ($t:ident, $octo:ident, $wide:ident) => {
         impl Lanes for $t {
             type Scalar = $t;
             type Mask = bool;
@@ -86,6 +86,7 @@ macro_rules! scalar_lanes {
 
         impl Real for $t {
             type Octo = super::$octo;
+            type Wide = super::$wide;
             const EPSILON: Self = $t::EPSILON / 2.0;
             const MIN_POSITIVE: Self = $t::MIN_POSITIVE;
             const MAX: Self = $t::MAX;
@@ -115,5 +116,5 @@ macro_rules! scalar_lanes {
     };
 }
 
-scalar_lanes!(f32, f32x8);
-scalar_lanes!(f64, f64x8);
+scalar_lanes!(f32, f32x8, f32x16);
+scalar_lanes!(f64, f64x8, f64x8);

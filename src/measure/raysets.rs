@@ -225,8 +225,8 @@ pub struct Setting {
 /// `up`: the camera's unit up vector; `clearance`: distance from the eye along `up` to the first surface.
 pub fn light_for(lights: &[Light], eye: DVec3, up: DVec3, diagonal: f64, clearance: f64) -> DVec3 {
     let point = lights.iter().find_map(|light| match light {
-        Light::Point { position, .. } => Some(*position),
-        Light::Directional { .. } => None,
+        Light::Point { position, .. } | Light::Spot { position, .. } => Some(*position),
+        Light::Directional { .. } | Light::Sun { .. } => None,
     });
     point.unwrap_or_else(|| eye + up * (LIGHT_RISE * diagonal).min(0.5 * clearance))
 }

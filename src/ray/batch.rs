@@ -47,6 +47,15 @@ impl<S: Real> Rays<S> {
         self.t_min.resize(padded, S::from_f64(1.0));
     }
 
+    /// Keeps the first `len` rays; those after them must be dead.
+    pub fn truncate(&mut self, len: usize) {
+        let padded = len.next_multiple_of(PAD);
+        self.len = len.min(self.len);
+        for array in self.org.iter_mut().chain(&mut self.dir).chain([&mut self.t_min, &mut self.t_max]) {
+            array.truncate(padded);
+        }
+    }
+
     /// Number of rays, without padding.
     pub fn len(&self) -> usize {
         self.len

@@ -42,13 +42,41 @@ pub enum Aov {
     Instance,
     /// `id.primitive`: primitive number, u32; `INVALID_ID` where nothing was hit.
     Primitive,
+    /// `P.X P.Y P.Z`: hit point in world space; 0 where nothing was hit.
+    Position,
+    /// `Ns.X Ns.Y Ns.Z`: unit shading normal, on the side of the geometric one; 0 where nothing was hit.
+    ShadingNormal,
+    /// `direct.R direct.G direct.B`: light seen itself or scattered once ([`crate::shade::Integrator::Path`] only).
+    Direct,
+    /// `indirect.R indirect.G indirect.B`: the rest of the radiance (the same).
+    Indirect,
+    /// `id.material`: material number, u32; `INVALID_ID` where nothing was hit.
+    Material,
+    /// `variance`: of the pixel's mean brightness, estimated from its samples; 0 for one sample.
+    Variance,
+    /// `samples`: number of samples, u32.
+    Samples,
     /// `cost.nodes`: node visits per primary ray (see [`crate::shade::Sample::nodes`]).
     Cost,
 }
 
 impl Aov {
     /// All of them, in the order of the film's planes.
-    pub const ALL: [Self; 6] = [Self::Z, Self::Normal, Self::Albedo, Self::Instance, Self::Primitive, Self::Cost];
+    pub const ALL: [Self; 13] = [
+        Self::Z,
+        Self::Normal,
+        Self::Albedo,
+        Self::Instance,
+        Self::Primitive,
+        Self::Cost,
+        Self::Position,
+        Self::ShadingNormal,
+        Self::Direct,
+        Self::Indirect,
+        Self::Material,
+        Self::Variance,
+        Self::Samples,
+    ];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
@@ -59,6 +87,13 @@ impl Aov {
             Self::Instance => "id.instance",
             Self::Primitive => "id.primitive",
             Self::Cost => "cost.nodes",
+            Self::Position => "P",
+            Self::ShadingNormal => "Ns",
+            Self::Direct => "direct",
+            Self::Indirect => "indirect",
+            Self::Material => "id.material",
+            Self::Variance => "variance",
+            Self::Samples => "samples",
         }
     }
 
@@ -79,6 +114,29 @@ impl Aov {
             Self::Instance => &[Channel { name: "id.instance", get: Get::U32(|s| s.inst) }],
             Self::Primitive => &[Channel { name: "id.primitive", get: Get::U32(|s| s.prim) }],
             Self::Cost => &[Channel { name: "cost.nodes", get: Get::F32(|s| s.nodes) }],
+            Self::Position => &[
+                Channel { name: "P.X", get: Get::F32(|s| s.position.x) },
+                Channel { name: "P.Y", get: Get::F32(|s| s.position.y) },
+                Channel { name: "P.Z", get: Get::F32(|s| s.position.z) },
+            ],
+            Self::ShadingNormal => &[
+                Channel { name: "Ns.X", get: Get::F32(|s| s.shading_normal.x) },
+                Channel { name: "Ns.Y", get: Get::F32(|s| s.shading_normal.y) },
+                Channel { name: "Ns.Z", get: Get::F32(|s| s.shading_normal.z) },
+            ],
+            Self::Direct => &[
+                Channel { name: "direct.R", get: Get::F32(|s| s.direct.x) },
+                Channel { name: "direct.G", get: Get::F32(|s| s.direct.y) },
+                Channel { name: "direct.B", get: Get::F32(|s| s.direct.z) },
+            ],
+            Self::Indirect => &[
+                Channel { name: "indirect.R", get: Get::F32(|s| s.radiance.x - s.direct.x) },
+                Channel { name: "indirect.G", get: Get::F32(|s| s.radiance.y - s.direct.y) },
+                Channel { name: "indirect.B", get: Get::F32(|s| s.radiance.z - s.direct.z) },
+            ],
+            Self::Material => &[Channel { name: "id.material", get: Get::U32(|s| s.material) }],
+            Self::Variance => &[Channel { name: "variance", get: Get::F32(|s| s.square) }],
+            Self::Samples => &[Channel { name: "samples", get: Get::U32(|s| s.samples) }],
         }
     }
 

@@ -1,13 +1,15 @@
 //! What to render, and who watches.
 
 use super::aov::Aov;
-use crate::camera::{PixelRect, Tiling};
+use crate::camera::{Filter, PixelRect, SubPixel, Tiling};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::shade::{Integrator, Settings};
 
 /// Most pixels of a film (a film of 12 planes then takes 12 GiB).
 const MAX_PIXELS: u64 = 1 << 28;
+/// Most pixels whose sums are all kept in memory (2 GiB).
+const MAX_ADAPTIVE: u64 = 1 << 23;
 /// Most samples per pixel and occlusion rays per hit; more is a slip of the keyboard.
 const MAX_SAMPLES: u32 = 1 << 20;
 /// Most mirrors of a path.
@@ -23,8 +25,14 @@ pub struct RenderOptions {
     pub height: u32,
     /// Part of it to render (y down, half open); `None` is all.
     pub crop: Option<Window>,
-    /// Samples per pixel: 1 goes through the centre, more are spread over the pixel.
+    /// Samples per pixel, at most: 1 goes through the centre (not of paths), more are spread over the pixel.
     pub spp: u32,
+    /// How samples are placed around the pixel's centre.
+    pub filter: Filter,
+    /// Stop adding samples after that many seconds (not before the first one of each pixel).
+    pub time_limit: Option<f64>,
+    /// Stop adding samples to a tile when the error of its mean brightness, relative, is estimated below this.
+    pub noise: Option<f64>,
     /// Seed of the random numbers.
     pub seed: u64,
     /// What is shown.
@@ -33,7 +41,7 @@ pub struct RenderOptions {
     pub engine: String,
     /// Tile edge: 8, 16 or 32 pixels. With the generic engines it changes no bit of the picture.
     pub tile: u32,
-    /// Mirror reflections followed.
+    /// Mirror reflections followed; scatterings of a path.
     pub depth: u32,
     /// Occlusion rays per hit.
     pub ao_samples: u32,
@@ -52,6 +60,9 @@ impl Default for RenderOptions {
             height: 540,
             crop: None,
             spp: 1,
+            filter: Filter::Box,
+            time_limit: None,
+            noise: None,
             seed: 0,
             integrator: Integrator::default(),
             engine: "auto".into(),
@@ -88,6 +99,14 @@ impl RenderOptions {
         if self.ao_samples == 0 || self.ao_samples > MAX_SAMPLES {
             return fail(format!("{} occlusion rays per hit: expected 1 to {MAX_SAMPLES}", self.ao_samples));
         }
+        for (name, number) in [("time limit", self.time_limit), ("noise", self.noise)] {
+            if number.is_some_and(|x| x.is_nan() || x <= 0.0) {
+                return fail(format!("{name} {}: expected a positive number", number.unwrap_or_default()));
+            }
+        }
+        if self.is_adaptive() && window.area() > MAX_ADAPTIVE {
+            return fail(format!("more than {MAX_ADAPTIVE} pixels with a time limit or a noise level; render crops"));
+        }
         if self.depth > MAX_DEPTH {
             return fail(format!("depth {}: expected at most {MAX_DEPTH}", self.depth));
         }
@@ -95,6 +114,23 @@ impl RenderOptions {
             return fail(format!("occlusion radius {}: expected a positive number", self.ao_radius));
         }
         Ok((tiling, window))
+    }
+
+    /// Whether the number of samples is found while rendering.
+    pub(super) fn is_adaptive(&self) -> bool {
+        self.time_limit.is_some() || self.noise.is_some()
+    }
+
+    /// Where in its pixel sample number `sample` goes.
+    pub fn sub_pixel(&self, sample: u32) -> SubPixel {
+        let (seed, filter) = (self.seed, self.filter);
+        if self.integrator == Integrator::Path || filter != Filter::Box {
+            SubPixel::Filtered { sample, seed, filter }
+        } else if self.spp == 1 {
+            SubPixel::Anchor
+        } else {
+            SubPixel::Sample { sample, seed }
+        }
     }
 
     pub(super) fn settings(&self) -> Settings {
@@ -105,6 +141,7 @@ impl RenderOptions {
             ao_radius: self.ao_radius,
             seed: self.seed,
             cost: self.integrator == Integrator::Cost || self.aovs.contains(&Aov::Cost),
+            first_hits: !self.aovs.is_empty(),
             count: self.count,
         }
     }

@@ -1,31 +1,57 @@
 //! Samples into pixels, pixels into planes.
 
+use glam::DVec3;
+
 use super::aov::{Aov, COLOR, Channel, Get};
 use crate::film::{Film, Plane, PlaneData, Window};
 use crate::shade::Sample;
 
 /// Adds `sample` to the sum of a pixel's samples. Colours, coverage, normals and costs add up (misses count as 0);
-/// distance and ids come together from the nearest sample, the first of equals.
+/// distance, position and ids come together from the nearest sample, the first of equals.
 pub(super) fn add(sum: &mut Sample, sample: &Sample) {
     sum.radiance += sample.radiance;
+    sum.square += brightness(sample.radiance).powi(2);
     sum.alpha += sample.alpha;
     sum.normal += sample.normal;
+    sum.shading_normal += sample.shading_normal;
     sum.albedo += sample.albedo;
+    sum.direct += sample.direct;
     sum.nodes += sample.nodes;
     if sample.distance < sum.distance {
         sum.distance = sample.distance;
-        (sum.inst, sum.prim) = (sample.inst, sample.prim);
+        sum.position = sample.position;
+        (sum.inst, sum.prim, sum.material) = (sample.inst, sample.prim, sample.material);
     }
+}
+
+/// What samples of a pixel are compared by.
+fn brightness(radiance: DVec3) -> f64 {
+    radiance.element_sum() / 3.0
+}
+
+/// Variance of the mean brightness that the `count` samples in `sum` estimate; 0 for one sample.
+pub(super) fn variance(sum: &Sample, count: u32) -> f64 {
+    if count < 2 {
+        return 0.0;
+    }
+    let n = f64::from(count);
+    let mean = brightness(sum.radiance) / n;
+    ((sum.square / n - mean * mean).max(0.0)) / (n - 1.0)
 }
 
 /// The pixel's value from the sum of its `spp` samples.
 pub(super) fn mean(sum: &Sample, spp: u32) -> Sample {
+    let (variance, samples) = (variance(sum, spp), spp);
     let spp = f64::from(spp);
     Sample {
         radiance: sum.radiance / spp,
+        square: variance,
+        samples,
         alpha: sum.alpha / spp,
         normal: sum.normal / spp,
+        shading_normal: sum.shading_normal / spp,
         albedo: sum.albedo / spp,
+        direct: sum.direct / spp,
         nodes: sum.nodes / spp,
         ..*sum
     }
@@ -72,8 +98,6 @@ impl Painter {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
 
     #[test]

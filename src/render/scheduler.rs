@@ -7,16 +7,19 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::options::{Progress, RenderOptions, rect_of};
-use super::pixels::{Painter, add, mean};
-use crate::camera::{Camera, PixelRect, SubPixel, Tiling, fill_tile, morton_decode};
+use super::pixels::{Painter, add, mean, variance};
+use crate::camera::{Camera, PixelRect, Tiling, fill_tile, morton_decode};
 use crate::error::Result;
 use crate::film::Film;
 use crate::lanes::Real;
 use crate::ray::{Counters, Rays};
 use crate::scene::description::Description;
 use crate::scene::world::World;
-use crate::shade::{RayCounts, Sample, Shader, Workspace, headlight};
+use crate::shade::{PathStats, RayCounts, Sample, Shader, Workspace, headlight};
 use crate::trace::{Engine, Engines, engine};
+
+/// Samples per pixel of the first round when the number is found while rendering; then it doubles.
+const FIRST_ROUND: u32 = 4;
 
 /// A picture and what it took.
 #[derive(Clone, Debug)]
@@ -30,10 +33,14 @@ pub struct RenderOutput {
     pub seconds: f64,
     /// What the engine counted; all zero unless counting or costs were asked for.
     pub counters: Counters,
+    /// Where the time of paths went, all threads together.
+    pub paths: PathStats,
     /// Tiles finished.
     pub tiles_done: u64,
     /// Tiles of the window.
     pub tiles_total: u64,
+    /// Samples over all pixels of finished tiles.
+    pub samples: u64,
 }
 
 impl RenderOutput {
@@ -46,7 +53,7 @@ impl RenderOutput {
 /// Renders with the engine called [`RenderOptions::engine`].
 ///
 /// The picture depends on the options and the scene only: not on threads, on the order of tiles or (with the
-/// generic engines) on the tile size.
+/// generic engines) on the tile size. With a time limit the number of samples depends on the machine.
 ///
 /// # Errors
 /// Options out of range; an unknown engine.
@@ -76,26 +83,38 @@ pub fn render_with<S: Real>(
     let start = Instant::now();
     let shader =
         Shader::new(world, description, engine, headlight(camera), options.settings()).with_rt(description, camera);
-    let job = Job { shader, camera, tiling, rect: rect_of(window), options, progress };
+    let job = Job { shader, camera, tiling, rect: rect_of(window), options, progress, start };
     let tiles = tiling.tiles_in(job.rect);
     let painter = Mutex::new(Painter::new(options.width, options.height, window, &options.aovs));
-    let one_tile = |memory: &mut TileMemory<S>, &tile: &u32| {
-        let finished = job.tile(tile, memory);
-        if finished {
-            job.paint(memory, &mut painter.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
-            progress.tile_done(tiles.len() as u64);
-        }
-        let work = &mut memory.work;
-        Tally { done: u64::from(finished), rays: take(&mut work.rays), counters: take(&mut work.counters) }
+    let painter_of = |painter: &Mutex<Painter>, sums: &Sums, pixels: &[(u32, u32)]| {
+        job.paint(sums, pixels, &mut painter.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
+        progress.tile_done(tiles.len() as u64);
     };
-    let tally = tiles.par_iter().map_init(TileMemory::default, one_tile).reduce(Tally::default, Tally::plus);
+    let tally = if options.is_adaptive() {
+        job.rounds(&tiles, |sums, pixels| painter_of(&painter, sums, pixels))
+    } else {
+        let one_tile = |memory: &mut TileMemory<S>, &tile: &u32| {
+            let mut sums = take(&mut memory.sums);
+            sums.start(job.tiling.rays_per_tile());
+            let finished = job.samples(tile, options.spp, &mut sums, memory);
+            if finished {
+                painter_of(&painter, &sums, &memory.pixels);
+            }
+            let tally = memory.tally(finished, &sums);
+            memory.sums = sums;
+            tally
+        };
+        tiles.par_iter().map_init(TileMemory::default, one_tile).reduce(Tally::default, Tally::plus)
+    };
     Ok(RenderOutput {
         film: painter.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()).film,
         rays: tally.rays,
         seconds: start.elapsed().as_secs_f64(),
         counters: tally.counters,
+        paths: tally.paths,
         tiles_done: tally.done,
         tiles_total: tiles.len() as u64,
+        samples: tally.samples,
     })
 }
 
@@ -103,15 +122,19 @@ pub fn render_with<S: Real>(
 #[derive(Default)]
 struct Tally {
     done: u64,
+    samples: u64,
     rays: RayCounts,
     counters: Counters,
+    paths: PathStats,
 }
 
 impl Tally {
     fn plus(mut self, other: Self) -> Self {
         self.done += other.done;
+        self.samples += other.samples;
         self.rays += other.rays;
         self.counters += other.counters;
+        self.paths.merge(&other.paths);
         self
     }
 }
@@ -124,6 +147,32 @@ struct Job<'a, S: Real> {
     rect: PixelRect,
     options: &'a RenderOptions,
     progress: &'a dyn Progress,
+    start: Instant,
+}
+
+/// The sums of a tile's samples, in the order of its rays.
+#[derive(Default)]
+struct Sums {
+    pixels: Vec<Sample>,
+    /// Samples of each pixel so far.
+    count: u32,
+}
+
+impl Sums {
+    fn start(&mut self, rays: u32) {
+        self.pixels.clear();
+        self.pixels.resize(rays as usize, Sample::MISS);
+        self.count = 0;
+    }
+
+    /// Estimate of the relative error of the pixels' mean brightness: root of the mean variance over the mean.
+    fn error(&self) -> f64 {
+        let n = f64::from(self.count);
+        let mean: f64 = self.pixels.iter().map(|p| p.radiance.element_sum() / (3.0 * n)).sum();
+        let square: f64 = self.pixels.iter().map(|p| variance(p, self.count)).sum();
+        let pixels = self.pixels.len() as f64;
+        if square > 0.0 { (square / pixels).sqrt() / (mean / pixels).max(f64::MIN_POSITIVE) } else { 0.0 }
+    }
 }
 
 /// One thread's arrays, reused from tile to tile.
@@ -133,7 +182,7 @@ struct TileMemory<S> {
     /// Pixel of each ray, also of dead ones.
     pixels: Vec<(u32, u32)>,
     samples: Vec<Sample>,
-    sums: Vec<Sample>,
+    sums: Sums,
 }
 
 impl<S: Real> Default for TileMemory<S> {
@@ -143,44 +192,103 @@ impl<S: Real> Default for TileMemory<S> {
             work: Workspace::default(),
             pixels: Vec::new(),
             samples: Vec::new(),
-            sums: Vec::new(),
+            sums: Sums::default(),
+        }
+    }
+}
+
+impl<S: Real> TileMemory<S> {
+    fn tally(&mut self, finished: bool, sums: &Sums) -> Tally {
+        let work = &mut self.work;
+        Tally {
+            done: u64::from(finished),
+            samples: if finished { u64::from(sums.count) * sums.pixels.len() as u64 } else { 0 },
+            rays: take(&mut work.rays),
+            counters: take(&mut work.counters),
+            paths: work.take_path_stats(),
         }
     }
 }
 
 impl<S: Real> Job<'_, S> {
-    /// All samples of a tile into `memory.sums`; false if stopped before the last one.
-    fn tile(&self, tile: u32, memory: &mut TileMemory<S>) -> bool {
+    /// Pixel of each ray of a tile.
+    fn list_pixels(&self, tile: u32, pixels: &mut Vec<(u32, u32)>) {
         let (x0, y0) = self.tiling.origin(tile);
-        let count = self.tiling.rays_per_tile();
-        memory.pixels.clear();
-        memory.pixels.extend((0..count).map(|i| {
+        pixels.clear();
+        pixels.extend((0..self.tiling.rays_per_tile()).map(|i| {
             let (dx, dy) = morton_decode(i);
             (x0 + dx, y0 + dy)
         }));
-        memory.sums.clear();
-        memory.sums.resize(count as usize, Sample::MISS);
-        for sample in 0..self.options.spp {
+    }
+
+    /// Adds samples to `sums` until there are `spp` of each pixel; false if stopped before.
+    fn samples(&self, tile: u32, spp: u32, sums: &mut Sums, memory: &mut TileMemory<S>) -> bool {
+        self.list_pixels(tile, &mut memory.pixels);
+        while sums.count < spp {
             if self.progress.stopped() {
                 return false;
             }
-            let sub_pixel = match self.options.spp {
-                1 => SubPixel::Anchor,
-                _ => SubPixel::Sample { sample, seed: self.options.seed },
-            };
+            let sample = sums.count;
+            let sub_pixel = self.options.sub_pixel(sample);
             fill_tile(self.camera, &self.tiling, tile, self.rect, sub_pixel, &mut memory.rays);
             self.shader.shade(&memory.rays, &memory.pixels, sample, &mut memory.work, &mut memory.samples);
-            for (sum, sample) in memory.sums.iter_mut().zip(&memory.samples) {
+            for (sum, sample) in sums.pixels.iter_mut().zip(&memory.samples) {
                 add(sum, sample);
             }
+            sums.count += 1;
         }
         true
     }
 
+    /// Rounds over all tiles, each doubling the samples, until all have the wanted samples or little noise, or the
+    /// time is over. Then calls `paint` for each tile that has samples.
+    fn rounds(&self, tiles: &[u32], paint: impl Fn(&Sums, &[(u32, u32)]) + Sync) -> Tally {
+        let (spp, limit) = (self.options.spp, self.options.time_limit.unwrap_or(f64::INFINITY));
+        let in_time = || self.start.elapsed().as_secs_f64() < limit;
+        let mut states: Vec<(u32, Sums, bool)> = tiles.iter().map(|&tile| (tile, Sums::default(), false)).collect();
+        let mut total = Tally::default();
+        let mut target = FIRST_ROUND.min(spp);
+        loop {
+            let one_tile = |memory: &mut TileMemory<S>, (tile, sums, is_done): &mut (u32, Sums, bool)| {
+                if *is_done {
+                    return Tally::default();
+                }
+                if sums.count == 0 {
+                    sums.start(self.tiling.rays_per_tile());
+                }
+                // The first samples are made even when the time is over: every pixel has some.
+                while sums.count < target && (sums.count == 0 || in_time()) {
+                    let next = sums.count + 1;
+                    if !self.samples(*tile, next, sums, memory) {
+                        break;
+                    }
+                }
+                *is_done = self.options.noise.is_some_and(|noise| sums.count >= FIRST_ROUND && sums.error() <= noise);
+                memory.tally(false, sums)
+            };
+            let round = states.par_iter_mut().map_init(TileMemory::default, one_tile);
+            total = total.plus(round.reduce(Tally::default, Tally::plus));
+            if target >= spp || !in_time() || self.progress.stopped() || states.iter().all(|state| state.2) {
+                break;
+            }
+            target = target.saturating_mul(2).min(spp);
+        }
+        let finished = |memory: &mut TileMemory<S>, (tile, sums, _): &(u32, Sums, bool)| {
+            if sums.count == 0 {
+                return Tally::default();
+            }
+            self.list_pixels(*tile, &mut memory.pixels);
+            paint(sums, &memory.pixels);
+            memory.tally(true, sums)
+        };
+        let painted = states.par_iter().map_init(TileMemory::default, finished);
+        total.plus(painted.reduce(Tally::default, Tally::plus))
+    }
+
     /// Puts the finished tile's pixels into the film.
-    fn paint(&self, memory: &TileMemory<S>, painter: &mut Painter) {
-        for (i, &(x, y)) in memory.pixels.iter().enumerate() {
-            painter.put(x, y, &mean(&memory.sums[i], self.options.spp));
+    fn paint(&self, sums: &Sums, pixels: &[(u32, u32)], painter: &mut Painter) {
+        for (sum, &(x, y)) in sums.pixels.iter().zip(pixels) {
+            painter.put(x, y, &mean(sum, sums.count));
         }
     }
 }

@@ -10,8 +10,13 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::brlcad::describe::Looks;
+use super::light::Environment;
 use super::mesh::Mesh;
 use super::solids::SolidTree;
+use super::texture::Texture;
+
+pub use super::light::Light;
+pub use super::material::Material;
 
 /// Index into [`Description::groups`].
 pub type GroupId = u32;
@@ -35,12 +40,16 @@ pub struct Description {
     pub solids: Vec<Arc<SolidTree>>,
     /// Materials; index 0 is the default material.
     pub materials: Vec<Material>,
+    /// Textures of materials.
+    pub textures: Vec<Arc<Texture>>,
     /// Lights; empty means the renderer adds a default light from the camera's side.
     pub lights: Vec<Light>,
     /// Cameras by name; empty means a default camera that frames the scene.
     pub cameras: Vec<CameraDescription>,
     /// Radiance of rays that leave the scene, linear Rec.709.
     pub background: DVec3,
+    /// What rays that leave the scene see instead of the background.
+    pub environment: Option<Environment>,
     /// Ambient radiance (first-light Whitted model), linear Rec.709.
     pub ambient: DVec3,
     /// Precision this scene asks for (`None`: f32).
@@ -113,44 +122,6 @@ pub enum Shape {
     },
 }
 
-/// A surface material of the first light: Lambert, ambient and a mirror part.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Material {
-    /// Name.
-    pub name: String,
-    /// Diffuse reflectance, linear Rec.709, 0..1.
-    pub diffuse: DVec3,
-    /// Mirror reflectance, linear Rec.709, 0..1.
-    pub mirror: DVec3,
-    /// Emitted radiance, linear Rec.709.
-    pub emission: DVec3,
-}
-
-impl Default for Material {
-    fn default() -> Self {
-        Self { name: "default".into(), diffuse: DVec3::splat(0.7), mirror: DVec3::ZERO, emission: DVec3::ZERO }
-    }
-}
-
-/// A light of the first light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Light {
-    /// Point light: irradiance at distance r is `intensity` / r^2.
-    Point {
-        /// World position.
-        position: DVec3,
-        /// Radiant intensity, linear Rec.709.
-        intensity: DVec3,
-    },
-    /// Directional light, infinitely far.
-    Directional {
-        /// Direction the light travels (from the light into the scene), need not be unit.
-        direction: DVec3,
-        /// Irradiance on a surface facing the light, linear Rec.709.
-        irradiance: DVec3,
-    },
-}
-
 /// A camera as written in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraDescription {
@@ -192,9 +163,11 @@ impl Description {
             meshes: Vec::new(),
             solids: Vec::new(),
             materials: vec![Material::default()],
+            textures: Vec::new(),
             lights: Vec::new(),
             cameras: Vec::new(),
             background: DVec3::ZERO,
+            environment: None,
             ambient: DVec3::splat(0.1),
             precision: None,
             looks: None,

@@ -15,6 +15,37 @@ pub struct Mesh {
     /// Runs of triangles with a common material or group, in order, covering all triangles; empty means one
     /// unnamed run.
     pub groups: Vec<MeshGroup>,
+    /// Shading normals, object space, need not be unit; zero or not finite where the file has none.
+    pub normals: Attribute<[f32; 3]>,
+    /// Sets of texture coordinates.
+    pub uvs: [Attribute<[f32; 2]>; 2],
+    /// Tangents x, y, z with the bitangent's sign in w, as glTF 2.0 defines them (section 3.7.2.1).
+    pub tangents: Attribute<[f32; 4]>,
+}
+
+/// Values at the corners of triangles; absent if there are no values.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Attribute<T> {
+    /// The values.
+    pub values: Vec<T>,
+    /// Indices of the values at each triangle's corners, in range; empty means those of the vertices.
+    pub indices: Vec<[u32; 3]>,
+}
+
+impl<T: Copy> Attribute<T> {
+    /// The values at the corners of triangle `i`, whose vertices are `vertices`; `None` if there are no values.
+    pub fn corners(&self, i: usize, vertices: [u32; 3]) -> Option<[T; 3]> {
+        if self.values.is_empty() {
+            return None;
+        }
+        let indices = self.indices.get(i).copied().unwrap_or(vertices);
+        Some(indices.map(|k| self.values[k as usize]))
+    }
+
+    /// Bytes of values and indices.
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(&self.values[..]) + size_of_val(&self.indices[..])) as u64
+    }
 }
 
 /// A run of triangles of a [`Mesh`] that share a name (OBJ `g`/`usemtl`).

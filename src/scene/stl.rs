@@ -74,7 +74,7 @@ fn parse_binary(file: &Path, bytes: &[u8]) -> Result<Mesh> {
     let mut weld = Weld::with_capacity(count / 2);
     let (records, _) = records.as_chunks::<RECORD>();
     let triangles = records.iter().map(|record| corners(record).map(|corner| weld.vertex(corner))).collect();
-    Ok(Mesh { positions: weld.into_positions(), triangles, groups: Vec::new() })
+    Ok(Mesh { positions: weld.into_positions(), triangles, groups: Vec::new(), ..Mesh::default() })
 }
 
 /// The three corners of a record.

@@ -9,6 +9,9 @@ pub enum Integrator {
     /// Source: T. Whitted, *An Improved Illumination Model for Shaded Display*, CACM 23(6), 1980.
     #[default]
     Whitted,
+    /// Path tracing: all light that scatters at surfaces.
+    /// Source: J. Kajiya, *The Rendering Equation*, SIGGRAPH 1986.
+    Path,
     /// Ambient occlusion: the cosine-weighted share of directions that are free up to a radius.
     Ao,
     /// Geometric normals turned towards the viewer, as 0.5 + 0.5 n.
@@ -23,12 +26,13 @@ pub enum Integrator {
 
 impl Integrator {
     /// All integrators.
-    pub const ALL: [Self; 6] = [Self::Whitted, Self::Ao, Self::Normals, Self::Depth, Self::Cost, Self::Rt];
+    pub const ALL: [Self; 7] = [Self::Whitted, Self::Path, Self::Ao, Self::Normals, Self::Depth, Self::Cost, Self::Rt];
 
     /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Whitted => "whitted",
+            Self::Path => "path",
             Self::Ao => "ao",
             Self::Normals => "normals",
             Self::Depth => "depth",

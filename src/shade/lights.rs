@@ -24,19 +24,36 @@ pub(super) fn irradiance(light: &Light, position: DVec3, normal: DVec3) -> Optio
             let to_light = from - position;
             (intensity / to_light.length_squared(), to_light)
         }
-        Light::Directional { direction, irradiance } => (irradiance, -direction),
+        Light::Spot { position: from, intensity, .. } => {
+            let to_light = from - position;
+            (intensity * spot_share(light, -to_light) / to_light.length_squared(), to_light)
+        }
+        Light::Directional { direction, irradiance } | Light::Sun { direction, irradiance, .. } => {
+            (irradiance, -direction)
+        }
     };
     let cosine = normal.dot(direction.normalize_or_zero());
     let value = arriving * cosine;
     (cosine > 0.0 && value.is_finite()).then_some(value)
 }
 
+/// Share of a spot light's intensity that goes along `away` (from the light, need not be unit); 1 for other lights.
+/// Source: the attenuation that the glTF extension KHR_lights_punctual recommends.
+pub(super) fn spot_share(light: &Light, away: DVec3) -> f64 {
+    let Light::Spot { direction, inner, outer, .. } = *light else { return 1.0 };
+    let cosine = away.normalize_or_zero().dot(direction.normalize_or_zero());
+    let (full, none) = (inner.cos(), outer.cos());
+    ((cosine - none) / (full - none).max(1e-6)).clamp(0.0, 1.0).powi(2)
+}
+
 /// Direction and end of the shadow ray from `org` to `light`. The ray to a point light ends just before it: with
 /// t = 1 at the light, so that a lamp drawn around or on a surface at that very point does not shade itself.
 pub(super) fn shadow_segment<S: Real>(light: &Light, org: DVec3) -> (DVec3, f64) {
     match *light {
-        Light::Point { position, .. } => (position - org, 1.0 - 32.0 * S::EPSILON.to_f64()),
-        Light::Directional { direction, .. } => (-direction, f64::INFINITY),
+        Light::Point { position, .. } | Light::Spot { position, .. } => {
+            (position - org, 1.0 - 32.0 * S::EPSILON.to_f64())
+        }
+        Light::Directional { direction, .. } | Light::Sun { direction, .. } => (-direction, f64::INFINITY),
     }
 }
 

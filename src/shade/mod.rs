@@ -5,10 +5,10 @@
 //! in an order that depends on the path alone, so a pixel's value does not depend on what else is in its batch.
 
 mod ambient_occlusion;
-mod extent;
 mod integrator;
 mod lights;
 mod offset;
+mod path;
 mod rt;
 mod shader;
 mod views;
@@ -17,5 +17,6 @@ mod whitted;
 pub use integrator::Integrator;
 pub use lights::headlight;
 pub use offset::{offset_origin, position_error};
+pub use path::{BounceStats, PathStats};
 pub use rt::unknown_shaders;
 pub use shader::{RayCounts, Sample, Settings, Shader, Workspace};

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::extent::magnitude;
 use super::integrator::Integrator;
 use super::offset::{offset_origin, position_error};
+use super::path::{PathMemory, PathStats, Paths};
 use super::rt::Rt;
 use crate::camera::Camera;
 use crate::lanes::Real;
@@ -21,7 +21,7 @@ const COST_BLOCK: usize = 16;
 pub struct Settings {
     /// What is shown.
     pub integrator: Integrator,
-    /// Mirror reflections followed after the primary hit.
+    /// Mirror reflections followed after the primary hit; scatterings of a path.
     pub depth: u32,
     /// Occlusion rays per primary hit.
     pub ao_samples: u32,
@@ -31,6 +31,8 @@ pub struct Settings {
     pub seed: u64,
     /// Whether node visits of primary rays are counted (see [`Sample::nodes`]).
     pub cost: bool,
+    /// Whether more is wanted of first hits than radiance and coverage (only paths save the work).
+    pub first_hits: bool,
     /// Whether all engine calls count ([`Workspace::counters`]); counting kernels are slower.
     pub count: bool,
 }
@@ -44,10 +46,22 @@ pub struct Sample {
     pub alpha: f64,
     /// Distance from the ray's origin to the hit, scene units.
     pub distance: f64,
+    /// Hit point, world space.
+    pub position: DVec3,
     /// Unit geometric normal, world space, turned towards the viewer.
     pub normal: DVec3,
-    /// Diffuse reflectance.
+    /// Unit shading normal on the same side.
+    pub shading_normal: DVec3,
+    /// Diffuse reflectance; the base colour of other materials.
     pub albedo: DVec3,
+    /// Part of the radiance that came from a light without detours: seen itself, or scattered once.
+    pub direct: DVec3,
+    /// Material number.
+    pub material: u32,
+    /// Of a pixel: variance of the mean brightness, estimated from its samples.
+    pub square: f64,
+    /// Of a pixel: number of samples.
+    pub samples: u32,
     /// Instance number.
     pub inst: u32,
     /// Primitive number.
@@ -63,8 +77,14 @@ impl Sample {
         radiance: DVec3::ZERO,
         alpha: 0.0,
         distance: f64::INFINITY,
+        position: DVec3::ZERO,
         normal: DVec3::ZERO,
+        shading_normal: DVec3::ZERO,
         albedo: DVec3::ZERO,
+        direct: DVec3::ZERO,
+        material: INVALID_ID,
+        square: 0.0,
+        samples: 0,
         inst: INVALID_ID,
         prim: INVALID_ID,
         nodes: 0.0,
@@ -82,12 +102,14 @@ pub struct RayCounts {
     pub occlusion: u64,
     /// Mirror reflections.
     pub mirror: u64,
+    /// Scattered along paths.
+    pub scattered: u64,
 }
 
 impl RayCounts {
     /// All rays.
     pub fn total(&self) -> u64 {
-        self.primary + self.shadow + self.occlusion + self.mirror
+        self.primary + self.shadow + self.occlusion + self.mirror + self.scattered
     }
 }
 
@@ -97,6 +119,7 @@ impl std::ops::AddAssign for RayCounts {
         self.shadow += o.shadow;
         self.occlusion += o.occlusion;
         self.mirror += o.mirror;
+        self.scattered += o.scattered;
     }
 }
 
@@ -110,6 +133,8 @@ pub(super) struct Vertex {
     pub error: DVec3,
     /// Unit, turned to the side the ray came from.
     pub normal: DVec3,
+    /// Unit shading normal on the same side.
+    pub shading_normal: DVec3,
     /// Direction the ray came along, not unit.
     pub dir: DVec3,
     pub material: u32,
@@ -129,6 +154,7 @@ pub struct Workspace<S> {
     pub(super) vertices: Vec<Vertex>,
     pub(super) batch: Rays<S>,
     pub(super) occluded: Vec<u8>,
+    pub(super) paths: PathMemory<S>,
     block: Rays<S>,
     block_hits: Hits<S>,
 }
@@ -143,9 +169,17 @@ impl<S: Real> Default for Workspace<S> {
             vertices: Vec::new(),
             batch: Rays::new(0),
             occluded: Vec::new(),
+            paths: PathMemory::default(),
             block: Rays::new(0),
             block_hits: Hits::new(0),
         }
+    }
+}
+
+impl<S: Real> Workspace<S> {
+    /// Takes what [`Integrator::Path`] counted.
+    pub fn take_path_stats(&mut self) -> PathStats {
+        std::mem::take(&mut self.paths.stats)
     }
 }
 
@@ -164,6 +198,7 @@ pub struct Shader<'a, S: Real> {
     materials: &'a [Material],
     default_material: Material,
     rt: Option<Rt>,
+    paths: Option<Paths<'a, S>>,
 }
 
 impl<'a, S: Real> Shader<'a, S> {
@@ -178,6 +213,8 @@ impl<'a, S: Real> Shader<'a, S> {
     ) -> Self {
         let diagonal = world.bounds().map_or(f64::INFINITY, |(lo, hi)| (hi - lo).length());
         let ao_length = settings.ao_radius * diagonal;
+        let paths = (settings.integrator == Integrator::Path)
+            .then(|| Paths::new(world, description, engine, default_light, &settings));
         let lights = if description.lights.is_empty() { vec![default_light] } else { description.lights.clone() };
         Self {
             world,
@@ -191,6 +228,7 @@ impl<'a, S: Real> Shader<'a, S> {
             materials: &description.materials,
             default_material: Material::default(),
             rt: None,
+            paths,
         }
     }
 
@@ -217,6 +255,9 @@ impl<'a, S: Real> Shader<'a, S> {
         if let (Integrator::Rt, Some(rt)) = (self.settings.integrator, &self.rt) {
             return self.rt(rt, rays, work, out);
         }
+        if let Some(paths) = &self.paths {
+            return paths.shade(rays, pixels, sample, work, out);
+        }
         if self.settings.cost {
             self.trace_blocks(rays, work, out);
         } else {
@@ -232,13 +273,16 @@ impl<'a, S: Real> Shader<'a, S> {
             let seen = &mut out[i];
             seen.alpha = 1.0;
             seen.distance = work.hits.t[i].to_f64() * vertex.dir.length();
+            seen.position = vertex.position;
             seen.normal = vertex.normal;
+            seen.shading_normal = vertex.shading_normal;
+            seen.material = vertex.material;
             seen.albedo = self.material(vertex.material).diffuse;
             (seen.inst, seen.prim) = (work.hits.inst[i], work.hits.prim[i]);
         }
         match self.settings.integrator {
             // Without regions to look at, `rt`'s model has nothing to say.
-            Integrator::Whitted | Integrator::Rt => self.whitted(rays, work, out),
+            Integrator::Whitted | Integrator::Rt | Integrator::Path => self.whitted(rays, work, out),
             Integrator::Ao => self.ambient_occlusion(pixels, sample, work, out),
             Integrator::Normals => super::views::normals(out),
             Integrator::Depth => super::views::depth(out),
@@ -292,9 +336,11 @@ impl<'a, S: Real> Shader<'a, S> {
         let facing = if surface.ng.dot(dir) > 0.0 { -surface.ng } else { surface.ng };
         // A triangle too thin for a normal is seen face on.
         let normal = if facing.is_finite() { facing } else { -dir.normalize_or_zero() };
-        let magnitude = magnitude(&self.world.assembly, hits.prim[i], hits.inst[i]);
-        let error = position_error::<S>(org, dir, t, surface.position, magnitude);
-        Vertex { path, position: surface.position, error, normal, dir, material: surface.material, throughput }
+        let shading_normal = if surface.ng.dot(dir) > 0.0 { -surface.ns } else { surface.ns };
+        let shading_normal = if surface.ng == normal || surface.ng == -normal { shading_normal } else { normal };
+        let error = position_error::<S>(org, dir, t, surface.position, surface.magnitude);
+        let (position, material) = (surface.position, surface.material);
+        Vertex { path, position, error, normal, shading_normal, dir, material, throughput }
     }
 
     /// Material number `id` of the description.

@@ -107,6 +107,8 @@ pub(super) fn render<S: Engines>(
         rays: crate::shade::RayCounts { primary: done.counters.rays, ..Default::default() },
         seconds: clock.elapsed().as_secs_f64(),
         counters: done.counters,
+        paths: Default::default(),
+        samples: window.area(),
         tiles_done: done.tiles,
         tiles_total: tiles.len() as u64,
     })

@@ -4,6 +4,7 @@
 pub mod action;
 pub mod heat;
 pub mod levels;
+pub mod meshes;
 pub mod pilot;
 pub mod reload;
 pub mod script;

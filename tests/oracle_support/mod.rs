@@ -71,7 +71,8 @@ pub fn read_ply(bytes: &[u8]) -> Mesh {
         assert_eq!(f[0], 3);
         [index(&f[1..5]), index(&f[5..9]), index(&f[9..])]
     });
-    let mesh = Mesh { positions: positions.collect(), triangles: triangles.collect(), groups: vec![] };
+    let mesh =
+        Mesh { positions: positions.collect(), triangles: triangles.collect(), groups: vec![], ..Mesh::default() };
     assert_eq!(mesh.triangles.len(), count("element face"));
     mesh
 }

@@ -102,6 +102,7 @@ mod tests {
             positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
             triangles: vec![[0, 0, 1], [0, 1, 2]],
             groups: Vec::new(),
+            ..Mesh::default()
         };
         let mut scene = Description::new("two");
         scene.meshes.push(Arc::new(mesh));

@@ -204,7 +204,10 @@ mod tests {
         let corner = DVec3::splat(10.0 * size);
         let positions = vec![corner, corner + DVec3::X * size, corner + DVec3::Y * size].into_iter();
         let positions = positions.map(|p| p.as_vec3().as_dvec3()).collect();
-        scene_of(ItemKind::Mesh(0), Some(Mesh { positions, triangles: vec![[0, 1, 2], [0, 1, 1]], groups: Vec::new() }))
+        scene_of(
+            ItemKind::Mesh(0),
+            Some(Mesh { positions, triangles: vec![[0, 1, 2], [0, 1, 1]], groups: Vec::new(), ..Mesh::default() }),
+        )
     }
 
     fn wide(v: [f32; 3]) -> DVec3 {
@@ -265,7 +268,10 @@ mod tests {
 
     #[test]
     fn what_cannot_be_hit_gets_dead_rays() {
-        for mesh in [Mesh::default(), Mesh { positions: vec![DVec3::NAN], triangles: vec![[0; 3]], groups: vec![] }] {
+        for mesh in [
+            Mesh::default(),
+            Mesh { positions: vec![DVec3::NAN], triangles: vec![[0; 3]], groups: vec![], ..Mesh::default() },
+        ] {
             let rays = scatter(&scene_of(ItemKind::Mesh(0), Some(mesh)), 100, 1);
             assert_eq!((rays[0].len(), rays[0].live_count()), (100, 0));
         }

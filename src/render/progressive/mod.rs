@@ -26,14 +26,14 @@ pub use steps::{LARGEST_BLOCK, Step};
 use super::options::{Progress, RenderOptions, rect_of};
 use super::pixels::{Painter, add, mean};
 use super::scheduler::RenderOutput;
-use crate::camera::{Camera, PixelRect, SubPixel, Tiling, fill_pixels, fill_tile, morton_decode};
-use crate::error::Result;
+use crate::camera::{Camera, PixelRect, Tiling, fill_pixels, fill_tile, morton_decode};
+use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::lanes::Real;
 use crate::ray::{Counters, Rays};
 use crate::scene::description::Description;
 use crate::scene::world::World;
-use crate::shade::{RayCounts, Sample, Shader, Workspace, headlight};
+use crate::shade::{PathStats, RayCounts, Sample, Shader, Workspace, headlight};
 use crate::trace::Engine;
 use steps::{Lattice, check_start, plan};
 
@@ -62,12 +62,9 @@ pub struct Progressive<'a, S: Real> {
     /// Tiles of the window, and what is known of each.
     tiles: Vec<(u32, Mutex<Tile>)>,
     frame: Mutex<Framebuffer>,
-    /// Batches done.
-    done: u64,
     /// Batches of all steps.
     total: u64,
-    rays: RayCounts,
-    counters: Counters,
+    tally: Tally,
     seconds: f64,
 }
 
@@ -86,11 +83,14 @@ struct Memory<S> {
     work: Workspace<S>,
     pixels: Vec<(u32, u32)>,
     samples: Vec<Sample>,
+    /// Samples made, not yet summed up.
+    traced: u64,
 }
 
 impl<S: Real> Default for Memory<S> {
     fn default() -> Self {
-        Self { rays: Rays::new(0), work: Workspace::default(), pixels: Vec::new(), samples: Vec::new() }
+        let (rays, work) = (Rays::new(0), Workspace::default());
+        Self { rays, work, pixels: Vec::new(), samples: Vec::new(), traced: 0 }
     }
 }
 
@@ -98,15 +98,20 @@ impl<S: Real> Default for Memory<S> {
 #[derive(Default)]
 struct Tally {
     done: u64,
+    /// Samples over all pixels.
+    samples: u64,
     rays: RayCounts,
     counters: Counters,
+    paths: PathStats,
 }
 
 impl Tally {
     fn plus(mut self, other: Self) -> Self {
         self.done += other.done;
+        self.samples += other.samples;
         self.rays += other.rays;
         self.counters += other.counters;
+        self.paths.merge(&other.paths);
         self
     }
 }
@@ -124,7 +129,7 @@ impl<'a, S: Real> Progressive<'a, S> {
     /// there are none). [`RenderOptions::engine`] is not looked at.
     ///
     /// # Errors
-    /// Options out of range; a start that is not 1, 2, 4, 8 or 16.
+    /// Options out of range, or a number of samples that is found while rendering; a start that is not 1, 2, 4, 8 or 16.
     pub fn new(
         engine: &'a dyn Engine<S>,
         world: &'a World<S>,
@@ -135,6 +140,10 @@ impl<'a, S: Real> Progressive<'a, S> {
     ) -> Result<Self> {
         check_start(start)?;
         let (tiling, window) = options.check()?;
+        if options.is_adaptive() {
+            let what = "pictures by blocks have a fixed number of samples: no time limit and no noise level";
+            return Err(Error::Usage(what.into()));
+        }
         let settings = options.settings();
         let start = if settings.cost || !engine.is_exact() { 1 } else { start };
         let painter = Painter::new(options.width, options.height, window, &options.aovs);
@@ -149,7 +158,6 @@ impl<'a, S: Real> Progressive<'a, S> {
         };
         let total = plan(start, options.spp).iter().map(batches).sum();
         let frame = Mutex::new(Framebuffer::new(painter, start));
-        let (rays, counters) = Default::default();
         Ok(Self {
             shader,
             camera,
@@ -160,10 +168,8 @@ impl<'a, S: Real> Progressive<'a, S> {
             start,
             tiles,
             frame,
-            done: 0,
             total,
-            rays,
-            counters,
+            tally: Tally::default(),
             seconds: 0.0,
         })
     }
@@ -173,23 +179,20 @@ impl<'a, S: Real> Progressive<'a, S> {
     pub fn run(&mut self, progress: &dyn Progress, viewer: &dyn Viewer) -> bool {
         let clock = Instant::now();
         let watch = Watch { progress, viewer, total: self.total };
-        let mut tally = Tally::default();
         let mut finished = true;
         for step in plan(self.start, self.options.spp) {
             let stopped = AtomicBool::new(false);
-            tally = tally.plus(match step {
+            let tally = match step {
                 Step::Blocks(block) => self.blocks(block, watch, &stopped),
                 Step::Samples(samples) => self.samples(samples, watch, &stopped),
-            });
+            };
+            self.tally = take(&mut self.tally).plus(tally);
             if stopped.into_inner() {
                 finished = false;
                 break;
             }
             viewer.step_done(&locked(&self.frame), step);
         }
-        self.done += tally.done;
-        self.rays += tally.rays;
-        self.counters += tally.counters;
         self.seconds += clock.elapsed().as_secs_f64();
         finished
     }
@@ -203,11 +206,13 @@ impl<'a, S: Real> Progressive<'a, S> {
     pub fn finish(self) -> RenderOutput {
         RenderOutput {
             film: self.frame.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()).into_film(),
-            rays: self.rays,
+            rays: self.tally.rays,
             seconds: self.seconds,
-            counters: self.counters,
-            tiles_done: self.done,
+            counters: self.tally.counters,
+            paths: self.tally.paths,
+            tiles_done: self.tally.done,
             tiles_total: self.total,
+            samples: self.tally.samples,
         }
     }
 
@@ -217,7 +222,7 @@ impl<'a, S: Real> Progressive<'a, S> {
         let one = |memory: &mut Memory<S>, batch: u32| {
             memory.pixels.clear();
             memory.pixels.extend(lattice.pixels(batch));
-            if self.done > 0 {
+            if self.tally.done > 0 {
                 let frame = locked(&self.frame);
                 memory.pixels.retain(|&(x, y)| !frame.is_set(x, y));
             }
@@ -225,8 +230,9 @@ impl<'a, S: Real> Progressive<'a, S> {
                 return Tally::default();
             }
             let size = (self.options.width, self.options.height);
-            fill_pixels(self.camera, size, &memory.pixels, self.sub_pixel(0), &mut memory.rays);
+            fill_pixels(self.camera, size, &memory.pixels, self.options.sub_pixel(0), &mut memory.rays);
             self.shader.shade(&memory.rays, &memory.pixels, 0, &mut memory.work, &mut memory.samples);
+            memory.traced += memory.pixels.len() as u64;
             for (&(x, y), sample) in memory.pixels.iter().zip(&memory.samples) {
                 self.keep_first(x, y, sample);
             }
@@ -273,11 +279,12 @@ impl<'a, S: Real> Progressive<'a, S> {
                 if stop(watch, stopped) {
                     return taken(memory, 0);
                 }
-                let sub_pixel = self.sub_pixel(tile.samples);
+                let sub_pixel = self.options.sub_pixel(tile.samples);
                 fill_tile(self.camera, &self.tiling, *number, self.rect, sub_pixel, &mut memory.rays);
-                let Memory { rays, work, pixels, samples: seen } = memory;
+                let Memory { rays, work, pixels, samples: seen, traced } = memory;
                 self.shader.shade(rays, pixels, tile.samples, work, seen);
                 tile.sums.iter_mut().zip(seen).for_each(|(sum, sample)| add(sum, sample));
+                *traced += pixels.len() as u64;
                 tile.samples += 1;
             }
             let frame = &mut *locked(&self.frame);
@@ -295,14 +302,6 @@ impl<'a, S: Real> Progressive<'a, S> {
         self.tiles.par_iter().map_init(Memory::default, one).reduce(Tally::default, Tally::plus)
     }
 
-    /// Where in its pixel sample number `sample` goes: as in the plain render.
-    fn sub_pixel(&self, sample: u32) -> SubPixel {
-        match self.options.spp {
-            1 => SubPixel::Anchor,
-            _ => SubPixel::Sample { sample, seed: self.options.seed },
-        }
-    }
-
     /// Tells who watches of a batch that is painted, and sums it up.
     fn told(&self, watch: Watch<'_>, frame: &Framebuffer, part: Window, memory: &mut Memory<S>) -> Tally {
         watch.viewer.painted(frame, part);
@@ -312,9 +311,10 @@ impl<'a, S: Real> Progressive<'a, S> {
 }
 
 /// What was counted since the last time.
-fn taken<S>(memory: &mut Memory<S>, done: u64) -> Tally {
+fn taken<S: Real>(memory: &mut Memory<S>, done: u64) -> Tally {
     let work = &mut memory.work;
-    Tally { done, rays: take(&mut work.rays), counters: take(&mut work.counters) }
+    let (rays, counters, paths) = (take(&mut work.rays), take(&mut work.counters), work.take_path_stats());
+    Tally { done, samples: take(&mut memory.traced), rays, counters, paths }
 }
 
 fn lattice(window: Window, tiling: &Tiling, block: u32, start: u32) -> Lattice {

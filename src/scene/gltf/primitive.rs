@@ -178,7 +178,7 @@ fn build(
         spend(document, positions.count, size_of::<DVec3>(), path)?;
         (0..positions.count).map(point).collect()
     };
-    Ok(Mesh { positions, triangles, groups: Vec::new() })
+    Ok(Mesh { positions, triangles, groups: Vec::new(), ..Mesh::default() })
 }
 
 fn spend(document: &Document<'_>, count: usize, size: usize, path: impl Display) -> Result<()> {

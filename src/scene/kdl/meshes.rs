@@ -96,7 +96,7 @@ impl Store {
 /// The polygon with corners `positions`, fanned from its first corner.
 pub fn polygon(positions: Vec<glam::DVec3>) -> Mesh {
     let triangles = (2..positions.len() as u32).map(|i| [0, i - 1, i]).collect();
-    Mesh { positions, triangles, groups: Vec::new() }
+    Mesh { positions, triangles, groups: Vec::new(), ..Mesh::default() }
 }
 
 /// Gives every material name that meshes use and `description` lacks the default look.

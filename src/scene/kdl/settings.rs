@@ -205,5 +205,6 @@ pub fn material(scope: &Scope<'_>, node: &Node<'_>) -> Result<Material> {
         diffuse: fields.colour("diffuse", 1.0)?.unwrap_or(plain.diffuse),
         mirror: fields.colour("mirror", 1.0)?.unwrap_or(plain.mirror),
         emission: fields.colour("emission", f64::INFINITY)?.unwrap_or(plain.emission),
+        ..plain
     })
 }

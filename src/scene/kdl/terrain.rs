@@ -34,7 +34,7 @@ pub fn terrain(size: u32, seed: u32) -> Mesh {
             triangles.extend([[a, c, b], [b, c, d]]);
         }
     }
-    Mesh { positions, triangles, groups: Vec::new() }
+    Mesh { positions, triangles, groups: Vec::new(), ..Mesh::default() }
 }
 
 /// Height in 0..1 at `x`, `z` in 0..1: octaves of noise, each damped where the sum below it is low, so that valleys

@@ -4,7 +4,9 @@
 //! instance is the identity is traced without an upper tree.
 
 mod compile;
+mod runs;
 mod solids;
+mod successor;
 mod surface;
 
 use glam::DVec3;
@@ -12,6 +14,7 @@ use glam::DVec3;
 pub use crate::bvh::Preset;
 pub use surface::Surface;
 
+use self::runs::Runs;
 use super::assembly::Assembly;
 use super::description::Shape;
 use crate::bvh::Tree;
@@ -130,18 +133,19 @@ pub struct World<S> {
     pub top_blocks: Vec<[u32; crate::bvh::LEAF_PRIMS]>,
     /// Instances without bounds.
     pub unbounded_instances: Vec<u32>,
-    /// Per object: first primitive of each run and its material, ascending.
-    materials: Vec<Vec<(u32, u32)>>,
-    counts: Counts,
+    /// Per object: its runs.
+    runs: Vec<Runs>,
+    /// By object.
+    counts: Vec<Counts>,
+    build_seconds: f64,
 }
 
-/// What compiling found.
+/// What compiling dropped of an object.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     nonfinite: u64,
     degenerate: u64,
     singular: u64,
-    build_seconds: f64,
 }
 
 /// Counts and sizes of a world, for `info` and `trace --json`.
@@ -208,10 +212,10 @@ impl<S: Real> World<S> {
             objects: self.objects.len() as u64,
             instances: self.instances.len() as u64,
             instanced_prims: self.assembly.instanced_prims(),
-            dropped_nonfinite: self.counts.nonfinite,
-            dropped_degenerate: self.counts.degenerate,
-            dropped_singular: self.counts.singular,
-            build_seconds: self.counts.build_seconds,
+            dropped_nonfinite: self.counts.iter().map(|c| c.nonfinite).sum(),
+            dropped_degenerate: self.counts.iter().map(|c| c.degenerate).sum(),
+            dropped_singular: self.counts.iter().map(|c| c.singular).sum(),
+            build_seconds: self.build_seconds,
             ..Default::default()
         };
         let mut most = 0;

@@ -1,57 +1,207 @@
 //! What shading needs of a hit, in f64, from the description's own numbers.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec2, DVec3};
 
 use super::{World, solids};
 use crate::lanes::Real;
 use crate::math::normal_to_world;
 use crate::scene::assembly::PartKind;
+use crate::scene::mesh::Mesh;
 
 /// A hit point with what shading needs, f64, world space.
 #[derive(Clone, Copy, Debug)]
-pub struct Surface {
+pub struct Surface<'a> {
     /// Hit point.
     pub position: DVec3,
-    /// Geometric normal, unit, as wound or outward (of a tree of solids, out of the whole); not turned towards the ray. Zero for degenerate geometry.
+    /// Geometric normal, unit, as wound or outward (of a tree of solids, out of the whole); not turned towards the
+    /// ray. Zero for degenerate geometry.
     pub ng: DVec3,
+    /// Shading normal, unit, on the side of the geometric one; equal to it where the mesh has none.
+    pub ns: DVec3,
+    /// Bound, per axis, of the coordinates that entered the intersection test: those of the triangle's corners (of
+    /// the box of a shape) taken through the maps without the cancellations that signs may bring.
+    pub magnitude: DVec3,
     /// Index into the description's materials.
     pub material: u32,
+    triangle: Option<OnTriangle<'a>>,
+}
+
+/// See [`World::bare_triangle`].
+#[derive(Clone, Copy, Debug)]
+pub struct Bare {
+    /// Index into the description's materials.
+    pub material: u32,
+    /// First corner and the edges from it to the second and the third, world space; `None` if it is no such triangle.
+    pub triangle: Option<[DVec3; 3]>,
+}
+
+/// Where on which triangle.
+#[derive(Clone, Copy, Debug)]
+struct OnTriangle<'a> {
+    mesh: &'a Mesh,
+    index: usize,
+    weights: [f64; 3],
+    to_world: DAffine3,
 }
 
 impl<S: Real> World<S> {
-    /// Position, geometric normal and material of a hit (all f64).
+    /// Position, normals and material of a hit (all f64).
     ///
     /// `org`, `dir`: the ray in world space; `t`, `u`, `v`, `prim`, `inst`: a hit of an engine of this world.
-    pub fn surface(&self, org: DVec3, dir: DVec3, t: f64, u: f64, v: f64, prim: u32, inst: u32) -> Surface {
+    pub fn surface(&self, org: DVec3, dir: DVec3, t: f64, u: f64, v: f64, prim: u32, inst: u32) -> Surface<'_> {
         let placement = &self.assembly.placements[inst as usize];
-        let part = self.assembly.part_of(placement.object, prim);
-        let to_world = placement.to_world * part.to_object;
-        let (position, ng) = match &part.kind {
+        let run = self.runs[placement.object as usize].of(prim);
+        let part = &self.assembly.objects[placement.object as usize].parts[run.part as usize];
+        let material = run.material;
+        let is_plain = self.instances[inst as usize].identity && part.to_object == DAffine3::IDENTITY;
+        let to_world = if is_plain { DAffine3::IDENTITY } else { placement.to_world * part.to_object };
+        let spread = |local: DVec3| through(&placement.to_world, through(&part.to_object, local));
+        match &part.kind {
             PartKind::Mesh(mesh) => {
-                let [a, b, c] = mesh.corners((prim - part.first_prim) as usize);
-                let local = a * (1.0 - u - v) + b * u + c * v;
-                (to_world.transform_point3(local), normal_to_world(&to_world, (b - a).cross(c - a)))
+                let index = (prim - part.first_prim) as usize;
+                let [a, b, c] = mesh.corners(index);
+                let size = a.abs().max(b.abs()).max(c.abs());
+                let weights = [1.0 - u - v, u, v];
+                let local = a * weights[0] + b * weights[1] + c * weights[2];
+                let cross = (b - a).cross(c - a);
+                let (position, ng, magnitude) = if is_plain {
+                    (local, cross.normalize_or_zero(), size)
+                } else {
+                    (to_world.transform_point3(local), normal_to_world(&to_world, cross), spread(size))
+                };
+                let on = OnTriangle { mesh, index, weights, to_world };
+                let ns = on.shading_normal().map_or(ng, |ns| if ns.dot(ng) < 0.0 { -ns } else { ns });
+                Surface { position, ng, ns, magnitude, material, triangle: Some(on) }
             }
             PartKind::Shape(shape) => {
                 let position = org + dir * t;
                 let local = to_world.inverse().transform_point3(position);
-                (position, normal_to_world(&to_world, solids::shape_normal(shape, local, u as u32)))
+                let ng = normal_to_world(&to_world, solids::shape_normal(shape, local, u as u32));
+                Surface { position, ng, ns: ng, magnitude: spread(DVec3::ONE), material, triangle: None }
             }
             PartKind::Solids(tree) => {
                 let leaf = &tree.leaves[(prim - part.first_prim) as usize];
                 let position = org + dir * t;
+                let (lo, hi) = leaf.solid.bounds();
+                let size = lo.abs().max(hi.abs());
+                let magnitude = spread(through(&leaf.to_tree, if size.is_finite() { size } else { DVec3::ONE }));
                 let to_world = to_world * leaf.to_tree;
                 let local = to_world.inverse().transform_point3(position);
                 let outward = normal_to_world(&to_world, solids::solid_normal(&leaf.solid, local, u as u32));
-                (position, if v > 0.5 { -outward } else { outward })
+                let ng = if v > 0.5 { -outward } else { outward };
+                Surface { position, ng, ns: ng, magnitude, material, triangle: None }
             }
-        };
-        Surface { position, ng, material: self.material(placement.object, prim) }
+        }
     }
 
-    fn material(&self, object: u32, prim: u32) -> u32 {
-        let runs = &self.materials[object as usize];
-        let after = runs.partition_point(|(first, _)| *first <= prim);
-        runs[after - 1].1
+    /// Material of primitive `prim` of `object`: an index into the description's materials.
+    pub fn material(&self, object: u32, prim: u32) -> u32 {
+        self.runs[object as usize].of(prim).material
     }
+
+    /// A hit on a triangle whose mesh has no shading normals, for those who compute the rest themselves.
+    #[inline]
+    pub fn bare_triangle(&self, prim: u32, inst: u32) -> Bare {
+        let placement = &self.assembly.placements[inst as usize];
+        let run = self.runs[placement.object as usize].of(prim);
+        let part = &self.assembly.objects[placement.object as usize].parts[run.part as usize];
+        let triangle = match &part.kind {
+            PartKind::Mesh(mesh) if mesh.normals.values.is_empty() => {
+                let [a, b, c] = mesh.corners((prim - part.first_prim) as usize);
+                let (e1, e2) = (b - a, c - a);
+                let is_plain = self.instances[inst as usize].identity && part.to_object == DAffine3::IDENTITY;
+                Some(if is_plain {
+                    [a, e1, e2]
+                } else {
+                    let m = placement.to_world * part.to_object;
+                    [m.transform_point3(a), m.transform_vector3(e1), m.transform_vector3(e2)]
+                })
+            }
+            _ => None,
+        };
+        Bare { material: run.material, triangle }
+    }
+}
+
+impl<S: Real> World<S> {
+    /// First primitive, and the one after the last, of each run of primitives of `object` with one material.
+    pub fn material_runs(&self, object: u32) -> impl Iterator<Item = (u32, u32)> {
+        let runs = self.runs[object as usize].list();
+        let count = self.assembly.objects[object as usize].prim_count;
+        let ends = runs.iter().skip(1).map(|run| run.first).chain([count]);
+        runs.iter().map(|run| run.first).zip(ends)
+    }
+}
+
+impl Surface<'_> {
+    /// Texture coordinates of set 0 or 1; (0, 0) where there are none.
+    pub fn uv(&self, set: u8) -> [f64; 2] {
+        let Some(on) = &self.triangle else { return [0.0; 2] };
+        on.uvs(set).map_or([0.0; 2], |uvs| {
+            let [a, b, c] = on.weights;
+            (uvs[0] * a + uvs[1] * b + uvs[2] * c).to_array()
+        })
+    }
+
+    /// Unit directions in which the texture coordinates u and v of set 0 or 1 grow, perpendicular to the shading
+    /// normal, as normal maps want them: by the mesh's tangents, or from positions and coordinates. `None` without
+    /// either.
+    pub fn tangents(&self, set: u8) -> Option<[DVec3; 2]> {
+        let on = self.triangle.as_ref()?;
+        let (along, sign) = on.tangent().or_else(|| on.tangent_by_uv(set))?;
+        let tangent = (along - self.ns * self.ns.dot(along)).try_normalize()?;
+        Some([tangent, self.ns.cross(tangent) * sign])
+    }
+}
+
+impl OnTriangle<'_> {
+    fn vertices(&self) -> [u32; 3] {
+        self.mesh.triangles[self.index]
+    }
+
+    fn shading_normal(&self) -> Option<DVec3> {
+        let corners = self.mesh.normals.corners(self.index, self.vertices())?;
+        let local = self.mean(corners.map(|n| DVec3::from(n.map(f64::from))));
+        let world = normal_to_world(&self.to_world, local);
+        (world != DVec3::ZERO).then_some(world)
+    }
+
+    fn mean(&self, corners: [DVec3; 3]) -> DVec3 {
+        let [a, b, c] = self.weights;
+        corners[0] * a + corners[1] * b + corners[2] * c
+    }
+
+    fn uvs(&self, set: u8) -> Option<[DVec2; 3]> {
+        let corners = self.mesh.uvs[usize::from(set.min(1))].corners(self.index, self.vertices())?;
+        Some(corners.map(|uv| DVec2::from(uv.map(f64::from))))
+    }
+
+    /// The mesh's own tangent and the sign of its bitangent.
+    fn tangent(&self) -> Option<(DVec3, f64)> {
+        let corners = self.mesh.tangents.corners(self.index, self.vertices())?;
+        let local = self.mean(corners.map(|[x, y, z, _]| DVec3::new(x.into(), y.into(), z.into())));
+        let mirrored = self.to_world.matrix3.determinant().signum();
+        Some((self.to_world.transform_vector3(local), f64::from(corners[0][3]) * mirrored))
+    }
+
+    /// The direction in which u grows, and on which side of it v grows.
+    fn tangent_by_uv(&self, set: u8) -> Option<(DVec3, f64)> {
+        let [a, b, c] = self.uvs(set)?;
+        let [p, q, r] = self.mesh.corners(self.index).map(|v| self.to_world.transform_point3(v));
+        let (e1, e2, d1, d2) = (q - p, r - p, b - a, c - a);
+        let determinant = d1.perp_dot(d2);
+        let along = (e1 * d2.y - e2 * d1.y) * determinant.signum();
+        // glTF's v points down, its bitangent up: coordinates that run against each other.
+        (determinant != 0.0).then(|| {
+            let down = (e2 * d1.x - e1 * d2.x) * determinant.signum();
+            let side = e1.cross(e2).cross(along).dot(down);
+            (along, if side > 0.0 { -1.0 } else { 1.0 })
+        })
+    }
+}
+
+/// Largest coordinates of the images under `map` of points with coordinates up to `magnitude`.
+fn through(map: &DAffine3, magnitude: DVec3) -> DVec3 {
+    let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis].map(DVec3::abs);
+    x * magnitude.x + y * magnitude.y + z * magnitude.z + map.translation.abs()
 }

@@ -1,0 +1,174 @@
+//! What `lanecast render` says when it is done.
+
+use serde::Serialize;
+
+use super::RenderArgs;
+use crate::cli::output::json_to_stdout;
+use crate::error::Result;
+use crate::lanes::compiled_isa;
+use crate::render::{RenderOptions, RenderOutput};
+use crate::shade::BounceStats;
+
+/// The object of `--json`.
+#[derive(Serialize)]
+pub(super) struct Report<'a> {
+    scene: &'a str,
+    file: String,
+    size: (u32, u32),
+    window: (u32, u32, u32, u32),
+    planes: Vec<&'a str>,
+    integrator: &'static str,
+    engine: &'static str,
+    precision: &'static str,
+    isa: &'static str,
+    threads: usize,
+    spp: u32,
+    samples_per_pixel: f64,
+    seed: u64,
+    complete: bool,
+    tiles: (u64, u64),
+    rays: Rays,
+    build_seconds: f64,
+    seconds: f64,
+    mrays_per_s: f64,
+    bounces: Vec<Bounce>,
+}
+
+#[derive(Serialize)]
+struct Rays {
+    primary: u64,
+    shadow: u64,
+    occlusion: u64,
+    mirror: u64,
+    scattered: u64,
+    total: u64,
+}
+
+/// What made a picture.
+pub(super) struct Made {
+    pub engine: &'static str,
+    pub precision: &'static str,
+    pub build_seconds: f64,
+}
+
+/// What `--json` says about a render.
+pub(super) fn report<'a>(
+    args: &'a RenderArgs,
+    options: &RenderOptions,
+    output: &'a RenderOutput,
+    made: &Made,
+) -> Report<'a> {
+    let (film, rays) = (&output.film, output.rays);
+    Report {
+        scene: &args.scene.scene,
+        file: args.file.path.display().to_string(),
+        size: (film.width, film.height),
+        window: (film.window.x0, film.window.y0, film.window.x1, film.window.y1),
+        planes: film.planes.iter().map(|plane| plane.name.as_str()).collect(),
+        integrator: options.integrator.name(),
+        engine: made.engine,
+        precision: made.precision,
+        isa: compiled_isa(),
+        threads: rayon::current_num_threads(),
+        spp: options.spp,
+        samples_per_pixel: output.samples as f64 / (output.tiles_done.max(1) as f64 * f64::from(options.tile).powi(2)),
+        seed: options.seed,
+        complete: output.is_complete(),
+        tiles: (output.tiles_done, output.tiles_total),
+        rays: Rays {
+            primary: rays.primary,
+            shadow: rays.shadow,
+            occlusion: rays.occlusion,
+            mirror: rays.mirror,
+            scattered: rays.scattered,
+            total: rays.total(),
+        },
+        build_seconds: made.build_seconds,
+        seconds: output.seconds,
+        mrays_per_s: rays.total() as f64 / output.seconds.max(f64::MIN_POSITIVE) / 1e6,
+        bounces: output.paths.bounces.iter().map(Bounce::new).collect(),
+    }
+}
+
+/// What was done: one JSON object on stdout, or a few lines on stderr.
+pub(super) fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput) -> Result<()> {
+    let (file, (width, height), rays) = (&report.file, report.size, &report.rays);
+    let (done, total) = report.tiles;
+    let part = match (report.complete, done) {
+        (true, _) => String::new(),
+        (false, 0) => format!(", none of {total} tiles was finished, nothing is written"),
+        (false, _) => format!(", only {done} of {total} tiles"),
+    };
+    args.output.say(&format!(
+        "{file}: {width}x{height}{part}, {} rays in {:.3} s with {} ({:.1} Mrays/s, shading included)",
+        rays.total, report.seconds, report.engine, report.mrays_per_s
+    ));
+    args.output.detail(&format!(
+        "rays: {} primary, {} shadow, {} occlusion, {} mirror, {} scattered; build {:.3} s",
+        rays.primary, rays.shadow, rays.occlusion, rays.mirror, rays.scattered, report.build_seconds
+    ));
+    let c = &output.counters;
+    args.output.detail(&format!(
+        "visits: {} nodes, {} leaves, {} primitive tests (counting kernels)",
+        c.nodes, c.leaves, c.prims
+    ));
+    if args.stats {
+        bounces(report).iter().for_each(|line| args.output.say(line));
+    }
+    if args.output.json { json_to_stdout(report) } else { Ok(()) }
+}
+
+/// One bounce of the paths; times are sums over threads.
+#[derive(Serialize)]
+struct Bounce {
+    rays: u64,
+    shadow_rays: u64,
+    lane_use: f64,
+    trace_seconds: f64,
+    shadow_seconds: f64,
+    shade_seconds: f64,
+}
+
+impl Bounce {
+    fn new(stats: &BounceStats) -> Self {
+        Self {
+            rays: stats.rays,
+            shadow_rays: stats.shadows,
+            lane_use: stats.points as f64 / stats.lanes.max(1) as f64,
+            trace_seconds: stats.tracing.as_secs_f64(),
+            shadow_seconds: stats.shadowing.as_secs_f64(),
+            shade_seconds: stats.shading.as_secs_f64(),
+        }
+    }
+}
+
+/// The table of `--stats`: rays by depth, lanes in use while shading, and where the time goes.
+fn bounces(report: &Report<'_>) -> Vec<String> {
+    let all = &report.bounces;
+    if all.is_empty() {
+        return vec!["--stats: only paths (--integrator path) are counted bounce by bounce".into()];
+    }
+    let sum = |get: fn(&Bounce) -> f64| all.iter().map(get).sum::<f64>();
+    let tracing = sum(|b| b.trace_seconds) + sum(|b| b.shadow_seconds);
+    let shading = sum(|b| b.shade_seconds);
+    let total = (tracing + shading).max(f64::MIN_POSITIVE);
+    let share = |x: f64| 100.0 * x / total;
+    let mut lines = vec!["bounce        rays      shadow  lane use  closest %  shadow %  shading %".into()];
+    lines.extend(all.iter().enumerate().map(|(i, b)| {
+        format!(
+            "{i:>6} {:>11} {:>11} {:>8.1}% {:>9.1} {:>9.1} {:>10.1}",
+            b.rays,
+            b.shadow_rays,
+            100.0 * b.lane_use,
+            share(b.trace_seconds),
+            share(b.shadow_seconds),
+            share(b.shade_seconds)
+        )
+    }));
+    lines.push(format!(
+        "intersection {:.1} %, shading and the rest {:.1} % of {total:.3} s over all threads",
+        share(tracing),
+        share(shading)
+    ));
+    lines
+}

@@ -1,0 +1,344 @@
+//! One thing that shines, and how a path aims at it.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DAffine3, DVec3};
+
+use super::lights::in_cone;
+use super::look::Looks;
+use crate::lanes::Real;
+use crate::scene::description::Light;
+use crate::scene::world::World;
+use crate::shade::lights::spot_share;
+
+/// Something that shines.
+#[derive(Clone, Copy, Debug)]
+pub enum Emitter {
+    /// A light without a surface.
+    Light(Light),
+    /// An emitting triangle, world space.
+    Triangle {
+        /// First corner.
+        corner: DVec3,
+        /// To the second and the third.
+        edges: [DVec3; 2],
+        /// Unit normal as wound.
+        normal: DVec3,
+        /// Area.
+        area: f64,
+        /// Material number.
+        material: u32,
+        /// Primitive and instance.
+        ids: [u32; 2],
+    },
+    /// An emitting disc or ellipse.
+    Disc {
+        /// Centre.
+        centre: DVec3,
+        /// To two ends of conjugate half diameters.
+        axes: [DVec3; 2],
+        /// Unit normal.
+        normal: DVec3,
+        /// Area.
+        area: f64,
+        /// Material number.
+        material: u32,
+    },
+    /// An emitting sphere.
+    Sphere {
+        /// Centre.
+        centre: DVec3,
+        /// Radius.
+        radius: f64,
+        /// Material number.
+        material: u32,
+    },
+    /// An emitting surface that paths find only by chance.
+    Unaimed,
+}
+
+/// Light that can arrive at a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Aim {
+    /// Where the light is, or, far away, the direction to it.
+    pub target: DVec3,
+    /// Whether it is infinitely far.
+    pub is_far: bool,
+    /// Unit direction to it.
+    pub dir: DVec3,
+    /// Density per solid angle; of a point, the chance of the light.
+    pub pdf: f64,
+    /// Radiance from there; of a point, irradiance on a surface that faces it.
+    pub radiance: DVec3,
+    /// Whether the light has no extent: nothing else ever finds it.
+    pub is_point: bool,
+}
+
+/// An emitting triangle of even radiance: corner, edges, normal, area and radiances to the front and to the back, in
+/// one list for packets to copy.
+#[derive(Clone, Copy, Debug)]
+pub struct Flat {
+    /// Corner, edge, edge, normal, radiance to the front, radiance to the back: three numbers each; area.
+    pub numbers: [f64; 19],
+}
+
+impl Emitter {
+    /// What packets need of a triangle of even radiance.
+    pub fn flat(&self, looks: &Looks<'_>) -> Option<Flat> {
+        let Self::Triangle { corner, edges, normal, area, material, .. } = *self else { return None };
+        if looks.material(material).textures.emission.is_some() {
+            return None;
+        }
+        let mut numbers = [0.0; 19];
+        let vectors = [corner, edges[0], edges[1], normal, plain(looks, material, true), plain(looks, material, false)];
+        for (to, from) in numbers.iter_mut().zip(vectors.iter().flat_map(|v| v.to_array()).chain([area])) {
+            *to = from;
+        }
+        Some(Flat { numbers })
+    }
+
+    /// A triangle with world-space `corners`.
+    pub fn triangle(corners: [DVec3; 3], material: u32, prim: u32, inst: u32) -> Self {
+        let [a, b, c] = corners;
+        let cross = (b - a).cross(c - a);
+        let (normal, area) = (cross.normalize_or_zero(), 0.5 * cross.length());
+        Self::Triangle { corner: a, edges: [b - a, c - a], normal, area, material, ids: [prim, inst] }
+    }
+
+    /// The image of the unit disc.
+    pub fn disc(to_world: &DAffine3, material: u32) -> Self {
+        let axes = [to_world.matrix3.x_axis, to_world.matrix3.y_axis];
+        let cross = axes[0].cross(axes[1]);
+        let mirrored = to_world.matrix3.determinant().signum();
+        let normal = cross.normalize_or_zero() * mirrored;
+        Self::Disc { centre: to_world.translation, axes, normal, area: PI * cross.length(), material }
+    }
+
+    /// The image of the unit sphere, if that is a sphere.
+    pub fn sphere(to_world: &DAffine3, material: u32) -> Self {
+        let m = to_world.matrix3;
+        let radius = m.x_axis.length();
+        let alike = |x: f64| (x - radius).abs() <= 1e-9 * radius;
+        let right = |x: f64| x.abs() <= 1e-9 * radius * radius;
+        let is_round = alike(m.y_axis.length()) && alike(m.z_axis.length());
+        let is_right = right(m.x_axis.dot(m.y_axis)) && right(m.y_axis.dot(m.z_axis)) && right(m.z_axis.dot(m.x_axis));
+        if is_round && is_right && radius > 0.0 {
+            Self::Sphere { centre: to_world.translation, radius, material }
+        } else {
+            Self::Unaimed
+        }
+    }
+
+    /// Power, roughly: what chances go by. `radius`: of the scene, scene units.
+    pub fn power(&self, radius: f64, looks: &Looks<'_>) -> f64 {
+        let mean = |c: DVec3| c.element_sum() / 3.0;
+        let surface = |area: f64, material: u32| {
+            let material = looks.material(material);
+            mean(material.emission) * area * PI * if material.one_sided { 1.0 } else { 2.0 }
+        };
+        match *self {
+            Self::Light(Light::Point { intensity, .. }) => mean(intensity) * 4.0 * PI,
+            Self::Light(Light::Spot { intensity, inner, outer, .. }) => {
+                mean(intensity) * TAU * (1.0 - 0.5 * (inner.cos() + outer.cos()))
+            }
+            Self::Light(Light::Directional { irradiance, .. } | Light::Sun { irradiance, .. }) => {
+                mean(irradiance) * PI * radius * radius
+            }
+            Self::Triangle { area, material, .. } | Self::Disc { area, material, .. } => surface(area, material),
+            // Only its outside shines into the scene.
+            Self::Sphere { radius, material, .. } => {
+                mean(looks.material(material).emission) * 4.0 * PI * PI * radius * radius
+            }
+            Self::Unaimed => 0.0,
+        }
+    }
+
+    /// Aims from `from`; the density is this emitter's alone.
+    pub fn aim<S: Real>(&self, from: DVec3, place: [f64; 2], world: &World<S>, looks: &Looks<'_>) -> Option<Aim> {
+        match *self {
+            Self::Light(light) => aim_at_light(&light, from, place),
+            Self::Triangle { corner, edges, normal, area, material, ids } => {
+                let [b, c] = on_triangle(place);
+                let target = corner + edges[0] * b + edges[1] * c;
+                let mut aim = planar(from, target, normal, area)?;
+                let front = normal.dot(aim.dir) < 0.0;
+                let own = looks.material(material);
+                aim.radiance = if own.textures.emission.is_some() {
+                    let surface = world.surface(target, DVec3::ZERO, 0.0, b, c, ids[0], ids[1]);
+                    looks.emission(material, &surface, front)
+                } else {
+                    plain(looks, material, front)
+                };
+                Some(aim)
+            }
+            Self::Disc { centre, axes, normal, area, material } => {
+                let radius = place[0].sqrt();
+                let (sin, cos) = (TAU * place[1]).sin_cos();
+                let mut aim = planar(from, centre + axes[0] * (radius * cos) + axes[1] * (radius * sin), normal, area)?;
+                aim.radiance = plain(looks, material, normal.dot(aim.dir) < 0.0);
+                Some(aim)
+            }
+            Self::Sphere { centre, radius, material } => {
+                let mut aim = aim_at_sphere(from, centre, radius, place)?;
+                aim.radiance = plain(looks, material, (aim.target - centre).dot(aim.dir) < 0.0);
+                Some(aim)
+            }
+            Self::Unaimed => None,
+        }
+    }
+
+    /// Radiance of a sun in direction `dir` (unit) and the density of [`Self::aim`] there.
+    pub fn sun(&self, dir: DVec3) -> Option<(DVec3, f64)> {
+        let Self::Light(Light::Sun { direction, irradiance, radius }) = *self else { return None };
+        let height = sun_height(radius);
+        let inside = 1.0 + dir.dot(direction.normalize_or_zero()) <= height;
+        inside.then(|| (sun_radiance(irradiance, radius), 1.0 / (TAU * height)))
+    }
+
+    /// Density of [`Self::aim`] from `from` per solid angle at `to`, where the unit normal is `ng`.
+    pub fn pdf(&self, from: DVec3, to: DVec3, ng: DVec3) -> f64 {
+        match *self {
+            Self::Triangle { area, .. } | Self::Disc { area, .. } => {
+                let away = to - from;
+                let square = away.length_squared();
+                let cosine = (away.dot(ng) / square.sqrt()).abs();
+                if cosine > 0.0 && area > 0.0 { square / (cosine * area) } else { 0.0 }
+            }
+            Self::Sphere { centre, radius, .. } => match cap((centre - from).length_squared(), radius) {
+                Some(height) => 1.0 / (TAU * height),
+                None => {
+                    let away = to - from;
+                    let square = away.length_squared();
+                    let cosine = (away.dot(ng) / square.sqrt()).abs();
+                    if cosine > 0.0 { square / (cosine * 4.0 * PI * radius * radius) } else { 0.0 }
+                }
+            },
+            Self::Light(_) | Self::Unaimed => 0.0,
+        }
+    }
+}
+
+fn plain(looks: &Looks<'_>, material: u32, front: bool) -> DVec3 {
+    let material = looks.material(material);
+    if material.one_sided && !front { DVec3::ZERO } else { material.emission }
+}
+
+/// Aim at `target` on a flat surface of `area`, without radiance.
+fn planar(from: DVec3, target: DVec3, normal: DVec3, area: f64) -> Option<Aim> {
+    let away = target - from;
+    let square = away.length_squared();
+    let dir = away.try_normalize()?;
+    let cosine = dir.dot(normal).abs();
+    (cosine > 0.0 && area > 0.0).then(|| Aim {
+        target,
+        is_far: false,
+        dir,
+        pdf: square / (cosine * area),
+        radiance: DVec3::ZERO,
+        is_point: false,
+    })
+}
+
+/// Weights of the second and third corner of a uniform point.
+/// Source: E. Heitz, *A Low-Distortion Map Between Triangle and Square*, 2019.
+fn on_triangle([u, v]: [f64; 2]) -> [f64; 2] {
+    if v > u { [0.5 * u, v - 0.5 * u] } else { [u - 0.5 * v, 0.5 * v] }
+}
+
+/// `1 - cos` of half the angle under which a sphere is seen from a distance whose square is `square`; `None` inside.
+fn cap(square: f64, radius: f64) -> Option<f64> {
+    let sin2 = radius * radius / square;
+    // (1 - cos) without cancellation for small angles.
+    (sin2 < 1.0 - 1e-9).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
+}
+
+fn aim_at_sphere(from: DVec3, centre: DVec3, radius: f64, place: [f64; 2]) -> Option<Aim> {
+    let to_centre = centre - from;
+    let square = to_centre.length_squared();
+    if let Some(height) = cap(square, radius) {
+        let dir = in_cone(to_centre.normalize(), height, place);
+        // The nearer intersection; at the rim the root may be lost to rounding.
+        let middle = dir.dot(to_centre);
+        let half = (radius * radius - (square - middle * middle)).max(0.0).sqrt();
+        let target = from + dir * (middle - half);
+        let pdf = 1.0 / (TAU * height);
+        return Some(Aim { target, is_far: false, dir, pdf, radiance: DVec3::ZERO, is_point: false });
+    }
+    let normal = in_cone(DVec3::Z, 2.0, place);
+    planar(from, centre + normal * radius, normal, 4.0 * PI * radius * radius)
+}
+
+fn aim_at_light(light: &Light, from: DVec3, place: [f64; 2]) -> Option<Aim> {
+    let far = |dir: DVec3, pdf: f64, radiance: DVec3, is_point: bool| {
+        Some(Aim { target: dir, is_far: true, dir, pdf, radiance, is_point })
+    };
+    match *light {
+        Light::Point { position, intensity } | Light::Spot { position, intensity, .. } => {
+            let away = position - from;
+            let dir = away.try_normalize()?;
+            let radiance = intensity * (spot_share(light, -away) / away.length_squared());
+            radiance.is_finite().then_some(Aim {
+                target: position,
+                is_far: false,
+                dir,
+                pdf: 1.0,
+                radiance,
+                is_point: true,
+            })
+        }
+        Light::Directional { direction, irradiance } => far(-direction.try_normalize()?, 1.0, irradiance, true),
+        Light::Sun { direction, irradiance, radius } => {
+            let height = sun_height(radius);
+            let dir = in_cone(-direction.try_normalize()?, height, place);
+            far(dir, 1.0 / (TAU * height), sun_radiance(irradiance, radius), false)
+        }
+    }
+}
+
+/// `1 - cos` of a sun's radius.
+fn sun_height(radius: f64) -> f64 {
+    2.0 * (0.5 * radius).sin().powi(2)
+}
+
+/// Irradiance of a disc of radiance L, face on, is L pi sin^2 of its radius.
+fn sun_radiance(irradiance: DVec3, radius: f64) -> DVec3 {
+    irradiance / (PI * radius.sin().powi(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::sampling::PixelRandom;
+
+    #[test]
+    fn spheres_are_seen_under_their_solid_angle() {
+        let (centre, radius, from) = (DVec3::new(1.0, 2.0, 3.0), 0.5, DVec3::new(-1.0, 0.0, 4.0));
+        let random = PixelRandom::new(0, 0, 0);
+        for k in 0..1000 {
+            let aim = aim_at_sphere(from, centre, radius, random.spread(k, 0)).unwrap();
+            assert!(((aim.target - centre).length() - radius).abs() < 1e-6, "{k}");
+            let normal = (aim.target - centre) / radius;
+            assert!(normal.dot(aim.dir) < 1e-6);
+            let sphere = Emitter::Sphere { centre, radius, material: 0 };
+            assert!((sphere.pdf(from, aim.target, normal) / aim.pdf - 1.0).abs() < 1e-9);
+        }
+        let sin2 = radius * radius / (centre - from).length_squared();
+        let solid_angle = TAU * (1.0 - (1.0 - sin2).sqrt());
+        let aim = aim_at_sphere(from, centre, radius, [0.3, 0.4]).unwrap();
+        assert!((aim.pdf * solid_angle - 1.0).abs() < 1e-9);
+        let inside = aim_at_sphere(centre + DVec3::X * 0.1, centre, radius, [0.3, 0.4]).unwrap();
+        assert!(((inside.target - centre).length() - radius).abs() < 1e-12 && inside.pdf > 0.0);
+    }
+
+    #[test]
+    fn triangle_points_are_uniform() {
+        let random = PixelRandom::new(3, 1, 0);
+        let (mut mean, n) = ([0.0; 2], 4096);
+        for k in 0..n {
+            let [b, c] = on_triangle(random.spread(k, 0));
+            assert!(b >= 0.0 && c >= 0.0 && b + c <= 1.0 + 1e-12);
+            mean = [mean[0] + b / f64::from(n), mean[1] + c / f64::from(n)];
+        }
+        assert!(mean.iter().all(|m| (m - 1.0 / 3.0).abs() < 2e-3), "{mean:?}");
+    }
+}

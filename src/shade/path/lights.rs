@@ -1,0 +1,209 @@
+//! What shines: the list of lights and emitting surfaces that paths aim at.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+
+use super::alias::Alias;
+use super::emitter::{Aim, Emitter, Flat};
+use super::look::Looks;
+use super::sky::Sky;
+use crate::lanes::Real;
+use crate::scene::assembly::{Part, PartKind};
+use crate::scene::description::{Description, Light, Shape};
+use crate::scene::world::World;
+
+/// Emitting primitives of an object: first primitive, number, and how many of the object come before.
+type Run = (u32, u32, u32);
+
+/// Everything that shines.
+pub struct Lights<'a> {
+    emitters: Vec<Emitter>,
+    /// Parallel to the emitters: what packets need of those that are even triangles.
+    flats: Vec<Option<Flat>>,
+    alias: Alias,
+    /// Per placement: the number of its first emitting primitive in the list; `u32::MAX` if it has none.
+    first: Vec<u32>,
+    /// Per object.
+    runs: Vec<Vec<Run>>,
+    /// Index of the sky in the list.
+    sky_index: usize,
+    sky: Option<Sky<'a>>,
+    /// Indices of the suns: rays that leave the scene may see them.
+    suns: Vec<usize>,
+    background: DVec3,
+}
+
+impl<'a> Lights<'a> {
+    /// The lights of `description`, `headlight` if nothing shines in it, and the emitting surfaces of `world`.
+    pub fn new<S: Real>(world: &World<S>, description: &'a Description, looks: &Looks<'_>, headlight: Light) -> Self {
+        let (runs, first, mut emitters) = surfaces(world, looks);
+        emitters.extend(description.lights.iter().map(|&light| Emitter::Light(light)));
+        let is_dark = description.environment.is_none() && description.background == DVec3::ZERO;
+        if emitters.is_empty() && is_dark {
+            emitters.push(Emitter::Light(headlight));
+        }
+        let is_sun = |e: &Emitter| matches!(e, Emitter::Light(Light::Sun { .. }));
+        let suns = (0..emitters.len()).filter(|&i| is_sun(&emitters[i])).collect();
+        let sky = description.environment.as_ref().map(Sky::new);
+        let sky_index = emitters.len();
+        let radius = world.bounds().map_or(1.0, |(lo, hi)| 0.5 * (hi - lo).length()).max(1e-30);
+        let mut weights: Vec<f64> = emitters.iter().map(|e| e.power(radius, looks)).collect();
+        weights.extend(sky.as_ref().map(|sky| sky.brightness() * PI * radius * radius));
+        let flats = emitters.iter().map(|e| e.flat(looks)).collect();
+        Self {
+            emitters,
+            flats,
+            alias: Alias::new(&weights),
+            first,
+            runs,
+            sky_index,
+            sky,
+            suns,
+            background: description.background,
+        }
+    }
+
+    /// The light that `choice` in [0, 1) falls on, and its chance.
+    #[inline]
+    pub fn choose(&self, choice: f64) -> Option<(usize, f64)> {
+        let index = self.alias.choose(choice)?;
+        Some((index, self.alias.chance(index)))
+    }
+
+    /// Light `index`, if it is a triangle that shines evenly.
+    #[inline]
+    pub fn flat(&self, index: usize) -> Option<&Flat> {
+        self.flats.get(index)?.as_ref()
+    }
+
+    /// Whether nothing can be aimed at.
+    pub fn is_empty(&self) -> bool {
+        self.alias.choose(0.0).is_none()
+    }
+
+    /// Aims from `from` at light `index`, whose chance is `chance`.
+    pub fn aim<S: Real>(
+        &self,
+        from: DVec3,
+        (index, chance): (usize, f64),
+        place: [f64; 2],
+        world: &World<S>,
+        looks: &Looks<'_>,
+    ) -> Option<Aim> {
+        let aim = if index == self.sky_index {
+            let sky = self.sky.as_ref()?;
+            let (dir, pdf) = sky.sample(place)?;
+            Aim { target: dir, is_far: true, dir, pdf, radiance: sky.radiance(dir), is_point: false }
+        } else {
+            self.emitters[index].aim(from, place, world, looks)?
+        };
+        let pdf = if aim.is_point { chance } else { aim.pdf * chance };
+        (pdf > 0.0).then_some(Aim { pdf, ..aim })
+    }
+
+    /// Density with which [`Self::aim`] from `from` finds the hit at `to`, unit geometric normal `ng`, on primitive
+    /// `prim` of instance `inst`: per solid angle; 0 if it never does.
+    pub fn pdf_of_hit<S: Real>(
+        &self,
+        from: DVec3,
+        to: DVec3,
+        ng: DVec3,
+        prim: u32,
+        inst: u32,
+        world: &World<S>,
+    ) -> f64 {
+        let first = self.first[inst as usize];
+        if first == u32::MAX {
+            return 0.0;
+        }
+        let runs = &self.runs[world.assembly.placements[inst as usize].object as usize];
+        let after = runs.partition_point(|run| run.0 <= prim);
+        let Some(&(start, count, before)) = after.checked_sub(1).map(|i| &runs[i]) else { return 0.0 };
+        if prim - start >= count {
+            return 0.0;
+        }
+        let index = (first + before + prim - start) as usize;
+        self.alias.chance(index) * self.emitters[index].pdf(from, to, ng)
+    }
+
+    /// Radiance of a ray that leaves the scene in direction `dir` (unit): each source of it times `weight` of the
+    /// density per solid angle with which [`Self::aim`] finds it there.
+    pub fn beyond(&self, dir: DVec3, weight: impl Fn(f64) -> f64) -> DVec3 {
+        let mut sum = match &self.sky {
+            None => self.background * weight(0.0),
+            Some(sky) => sky.radiance(dir) * weight(self.alias.chance(self.sky_index) * sky.pdf(dir)),
+        };
+        for &sun in &self.suns {
+            if let Some((radiance, pdf)) = self.emitters[sun].sun(dir) {
+                sum += radiance * weight(self.alias.chance(sun) * pdf);
+            }
+        }
+        sum
+    }
+}
+
+/// The emitting runs of each object, where each placement's primitives begin in the list, and the list.
+fn surfaces<S: Real>(world: &World<S>, looks: &Looks<'_>) -> (Vec<Vec<Run>>, Vec<u32>, Vec<Emitter>) {
+    let assembly = &world.assembly;
+    let emits = |object: usize, prim: u32| {
+        let id = world.material(object as u32, prim);
+        looks.material(id).emission != DVec3::ZERO
+    };
+    let runs: Vec<Vec<Run>> = (0..assembly.objects.len())
+        .map(|object| {
+            let mut list: Vec<Run> = Vec::new();
+            let mut before = 0;
+            for (start, end) in world.material_runs(object as u32) {
+                if start < end && emits(object, start) {
+                    list.push((start, end - start, before));
+                    before += end - start;
+                }
+            }
+            list
+        })
+        .collect();
+    let mut emitters = Vec::new();
+    let first = assembly
+        .placements
+        .iter()
+        .enumerate()
+        .map(|(inst, placement)| {
+            let list = &runs[placement.object as usize];
+            if list.is_empty() {
+                return u32::MAX;
+            }
+            let first = emitters.len() as u32;
+            for &(start, count, _) in list {
+                for prim in start..start + count {
+                    let part = assembly.part_of(placement.object, prim);
+                    let to_world = placement.to_world * part.to_object;
+                    emitters.push(surface(part, prim, inst as u32, world.material(placement.object, prim), &to_world));
+                }
+            }
+            first
+        })
+        .collect();
+    (runs, first, emitters)
+}
+
+fn surface(part: &Part, prim: u32, inst: u32, material: u32, to_world: &glam::DAffine3) -> Emitter {
+    match &part.kind {
+        PartKind::Mesh(mesh) => {
+            let corners = mesh.corners((prim - part.first_prim) as usize).map(|p| to_world.transform_point3(p));
+            Emitter::triangle(corners, material, prim, inst)
+        }
+        PartKind::Shape(Shape::Sphere) => Emitter::sphere(to_world, material),
+        PartKind::Shape(Shape::Disc) => Emitter::disc(to_world, material),
+        _ => Emitter::Unaimed,
+    }
+}
+
+/// A uniform direction of the cone around `axis` whose cosine of the half angle is `1 - height`, as a unit vector.
+pub(super) fn in_cone(axis: DVec3, height: f64, place: [f64; 2]) -> DVec3 {
+    let below = place[0] * height;
+    let sin = (below * (2.0 - below)).max(0.0).sqrt();
+    let [x, y] = crate::camera::sampling::orthonormal_basis(axis);
+    let (s, c) = (TAU * place[1]).sin_cos();
+    x * (sin * c) + y * (sin * s) + axis * (1.0 - below)
+}

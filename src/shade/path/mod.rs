@@ -1,0 +1,361 @@
+//! Path tracing in waves: the rays of one bounce of many paths are traced as one batch, sorted by model of
+//! scattering, and shaded in packets.
+//!
+//! A path meets emitting surfaces in two ways, by the direction it chose and by aiming at a light, weighted by the
+//! power heuristic; it ends by chance when little of its light would arrive.
+//!
+//! Sources: J. Kajiya, *The Rendering Equation*, 1986; E. Veach, *Robust Monte Carlo Methods for Light Transport
+//! Simulation*, 1997; S. Laine, T. Karras, T. Aila, *Megakernels Considered Harmful: Wavefront Path Tracing on GPUs*,
+//! 2013.
+//!
+//! All numbers of a path are functions of its pixel, sample and bounce, and lanes never look at each other, so a
+//! picture does not depend on what else is in a wave.
+
+mod alias;
+mod bsdf;
+mod emitter;
+mod lights;
+mod look;
+mod points;
+mod scatter;
+mod sky;
+mod stats;
+mod through;
+mod wave;
+
+use std::time::Instant;
+
+use glam::DVec3;
+
+pub use self::stats::{BounceStats, PathStats};
+
+use self::bsdf::{
+    Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
+};
+use self::lights::Lights;
+use self::look::{Look, Looks, Model};
+use self::points::{
+    BASE, FIELDS, NORMAL, OFFSET, OUT, PARAM, POSITION, Points, RAW_CORNER, RAW_EDGE1, RAW_EDGE2, RAW_PLACE, SHADING,
+    SQUEEZE, THROUGHPUT,
+};
+use self::scatter::Chances;
+use self::wave::{Shadows, Wave};
+use super::offset::position_error;
+use super::shader::{Sample, Settings, Workspace};
+use crate::camera::sobol::PixelPoints;
+use crate::lanes::{Real, dot};
+use crate::ray::{Hits, Rays};
+use crate::scene::description::{Description, Light};
+use crate::scene::world::{Surface, World};
+use crate::trace::Engine;
+
+/// Shadow rays to a place end this many roundings before it.
+const SHADOW_ROUNDINGS: f64 = 256.0;
+
+/// What all paths of a picture share.
+pub(super) struct Paths<'a, S: Real> {
+    world: &'a World<S>,
+    engine: &'a dyn Engine<S>,
+    looks: Looks<'a>,
+    lights: Lights<'a>,
+    /// Scatterings of a path at most.
+    depth: u32,
+    seed: u64,
+    /// Whether properties of first hits are wanted besides radiance.
+    first_hits: bool,
+    shadow_end: S,
+}
+
+/// One thread's arrays, reused from wave to wave.
+#[derive(Debug)]
+pub(super) struct PathMemory<S> {
+    points: [Points<S>; Model::COUNT],
+    pixels: Vec<PixelPoints>,
+    now: Wave<S>,
+    next: Wave<S>,
+    shadows: Shadows<S>,
+    again: through::Again<S>,
+    /// What was counted.
+    pub stats: PathStats,
+}
+
+impl<S: Real> Default for PathMemory<S> {
+    fn default() -> Self {
+        Self {
+            points: std::array::from_fn(|_| Points::default()),
+            pixels: Vec::new(),
+            now: Wave::default(),
+            next: Wave::default(),
+            shadows: Shadows::default(),
+            again: through::Again::default(),
+            stats: PathStats::default(),
+        }
+    }
+}
+
+impl<'a, S: Real> Paths<'a, S> {
+    /// Paths of at most `settings.depth` scatterings through `world`, compiled from `description`; `headlight` lights a scene
+    /// in which nothing shines.
+    pub fn new(
+        world: &'a World<S>,
+        description: &'a Description,
+        engine: &'a dyn Engine<S>,
+        headlight: Light,
+        settings: &Settings,
+    ) -> Self {
+        let looks = Looks::new(description);
+        let lights = Lights::new(world, description, &looks, headlight);
+        let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
+        let Settings { depth, seed, first_hits, .. } = *settings;
+        Self { world, engine, looks, lights, depth, seed, first_hits, shadow_end }
+    }
+
+    /// The radiance along each ray of the primary batch `rays` into `out`, which holds misses; see
+    /// [`super::Shader::shade`].
+    pub fn shade(
+        &self,
+        rays: &Rays<S>,
+        pixels: &[(u32, u32)],
+        sample: u32,
+        work: &mut Workspace<S>,
+        out: &mut [Sample],
+    ) {
+        let mut memory = std::mem::take(&mut work.paths);
+        memory.pixels.clear();
+        memory.pixels.extend(pixels.iter().map(|&(x, y)| PixelPoints::new(x, y, self.seed)));
+        memory.start(rays);
+        for bounce in 0..=self.depth {
+            if memory.now.path.is_empty() {
+                break;
+            }
+            self.bounce(bounce, sample, &mut memory, work, out);
+            std::mem::swap(&mut memory.now, &mut memory.next);
+        }
+        work.paths = memory;
+    }
+
+    /// Traces the wave `memory.now`, and scatters what it hits into `memory.next`.
+    fn bounce(
+        &self,
+        bounce: u32,
+        sample: u32,
+        memory: &mut PathMemory<S>,
+        work: &mut Workspace<S>,
+        out: &mut [Sample],
+    ) {
+        let live = memory.now.path.len() as u64;
+        let clock = Instant::now();
+        self.closest(bounce, sample, memory, work);
+        let traced = clock.elapsed();
+        memory.points.iter_mut().for_each(Points::clear);
+        for i in 0..memory.now.path.len() {
+            self.arrive(i, bounce, sample, memory, &work.hits, out);
+        }
+        let mut stats = BounceStats { rays: live, tracing: traced, ..BounceStats::default() };
+        let count: usize = memory.points.iter().map(Points::len).sum();
+        stats.points = count as u64;
+        memory.next.open(count);
+        memory.shadows.open(count);
+        if bounce < self.depth {
+            stats.lanes = self.scatter_all(bounce, sample, memory);
+        }
+        memory.next.close();
+        memory.shadows.close();
+        stats.shading = clock.elapsed() - traced;
+        let clock = Instant::now();
+        stats.shadows = memory.shadows.path.len() as u64;
+        work.rays.shadow += stats.shadows;
+        // The primary rays are counted already.
+        work.rays.scattered += if bounce == 0 { 0 } else { live };
+        self.shadows(memory, work, |path, light| {
+            let seen = &mut out[path as usize];
+            seen.radiance += light;
+            if bounce == 0 {
+                seen.direct += light;
+            }
+        });
+        stats.shadowing = clock.elapsed();
+        memory.stats.add(bounce, &stats);
+    }
+
+    /// Every model's points in packets; lanes in all packets.
+    fn scatter_all(&self, bounce: u32, sample: u32, memory: &mut PathMemory<S>) -> u64 {
+        let chances = Chances { points: &memory.pixels, sample, bounce };
+        let (next, shadows) = (&mut memory.next, &mut memory.shadows);
+        let mut lanes = 0;
+        for (model, points) in memory.points.iter_mut().enumerate() {
+            if points.len() == 0 {
+                continue;
+            }
+            points.settle();
+            let width = <S::Wide as crate::lanes::Lanes>::N;
+            lanes += points.len().next_multiple_of(width) as u64;
+            match Model::ALL[model] {
+                Model::Matte => self.scatter::<Matte<S::Wide>>(points, &chances, next, shadows),
+                Model::SmoothConductor => self.scatter::<SmoothConductor<S::Wide>>(points, &chances, next, shadows),
+                Model::RoughConductor => self.scatter::<RoughConductor<S::Wide>>(points, &chances, next, shadows),
+                Model::SmoothDielectric => self.scatter::<SmoothDielectric<S::Wide>>(points, &chances, next, shadows),
+                Model::RoughDielectric => self.scatter::<RoughDielectric<S::Wide>>(points, &chances, next, shadows),
+                Model::Thin => self.scatter::<Thin<S::Wide>>(points, &chances, next, shadows),
+                Model::SmoothCoat => self.scatter::<SmoothCoat<S::Wide>>(points, &chances, next, shadows),
+                Model::RoughCoat => self.scatter::<RoughCoat<S::Wide>>(points, &chances, next, shadows),
+                Model::MetalRough => self.scatter::<MetalRough<S::Wide>>(points, &chances, next, shadows),
+            }
+        }
+        lanes
+    }
+
+    /// Ray `i` of the wave has arrived: adds what shines there, and the point to those that scatter.
+    fn arrive(
+        &self,
+        i: usize,
+        bounce: u32,
+        sample: u32,
+        memory: &mut PathMemory<S>,
+        hits: &Hits<S>,
+        out: &mut [Sample],
+    ) {
+        let wave = &memory.now;
+        let (path, throughput) = (wave.path[i], DVec3::from(wave.throughput[i].map(S::to_f64)));
+        let (org, dir) = (DVec3::from(wave.rays.org(i).map(S::to_f64)), DVec3::from(wave.rays.dir(i).map(S::to_f64)));
+        let pdf = wave.pdf[i].to_f64();
+        // The power heuristic against a density with which a light would have been aimed at.
+        let weight = |light: f64| if pdf.is_infinite() { 1.0 } else { 1.0 / (1.0 + (light / pdf).powi(2)) };
+        let seen = &mut out[path as usize];
+        let mut shine = |light: DVec3| {
+            if light != DVec3::ZERO && light.is_finite() {
+                seen.radiance += light;
+                if bounce <= 1 {
+                    seen.direct += light;
+                }
+            }
+        };
+        if !hits.is_hit(i) {
+            let light = self.lights.beyond(dir.normalize_or_zero(), weight);
+            shine(throughput * light);
+            if bounce == 0 && light != DVec3::ZERO {
+                seen.alpha = 1.0;
+            }
+            return;
+        }
+        let (prim, inst) = (hits.prim[i], hits.inst[i]);
+        if bounce < self.depth {
+            let bare = self.world.bare_triangle(prim, inst);
+            if let (Some(triangle), Some(look)) = (bare.triangle, self.looks.uniform(bare.material)) {
+                if bounce == 0 {
+                    seen.alpha = 1.0;
+                    if self.first_hits {
+                        self.first_hit(org, dir, i, hits, seen);
+                    }
+                }
+                let fields = raw_fields(wave, i, hits, &triangle, look);
+                memory.points[look.model as usize].push(path, &fields, true);
+                return;
+            }
+        }
+        let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
+        let surface = self.world.surface(org, dir, t, u, v, prim, inst);
+        let from_front = surface.ng.dot(dir) <= 0.0;
+        let emitted = self.looks.emission(surface.material, &surface, from_front);
+        if emitted != DVec3::ZERO {
+            let light = if pdf.is_infinite() {
+                0.0
+            } else {
+                self.lights.pdf_of_hit(org, surface.position, surface.ng, prim, inst, self.world)
+            };
+            shine(throughput * emitted * weight(light));
+        }
+        if bounce > 0 && bounce == self.depth {
+            return;
+        }
+        let choice = || through::number(memory.pixels[path as usize], sample, bounce, through::MIXTURE);
+        let material =
+            if self.looks.has_mixtures { self.looks.resolve(surface.material, choice()) } else { surface.material };
+        let look = self.looks.look(material, &surface, from_front);
+        let out_dir = -dir.normalize_or_zero();
+        let ng = if from_front { surface.ng } else { -surface.ng };
+        let ns = self.shading_normal(material, &surface, from_front, ng, out_dir);
+        if bounce == 0 {
+            seen.alpha = 1.0;
+            self.first_hit(org, dir, i, hits, seen);
+            if self.depth == 0 {
+                return;
+            }
+        }
+        // A triangle too thin for a normal scatters nothing.
+        if ng == DVec3::ZERO || !ng.is_finite() {
+            return;
+        }
+        let error = position_error::<S>(org, dir, t, surface.position, surface.magnitude)
+            + surface.position.abs() * (2.0 * S::EPSILON.to_f64());
+        let mut fields = [S::ZERO; FIELDS];
+        let mut put = |at: usize, v: DVec3| (0..3).for_each(|axis| fields[at + axis] = S::from_f64(v[axis]));
+        put(POSITION, surface.position);
+        put(SHADING, ns);
+        put(NORMAL, ng);
+        put(OUT, out_dir);
+        put(BASE, look.base);
+        (0..7).for_each(|k| fields[PARAM + k] = S::from_f64(look.param[k]));
+        fields[OFFSET] = S::from_f64(ng.abs().dot(error));
+        fields[THROUGHPUT..THROUGHPUT + 3].copy_from_slice(&wave.throughput[i]);
+        fields[SQUEEZE] = wave.squeeze[i];
+        memory.points[look.model as usize].push(path, &fields, false);
+    }
+
+    /// What pictures show of the first hit, besides radiance.
+    fn first_hit(&self, org: DVec3, dir: DVec3, i: usize, hits: &Hits<S>, seen: &mut Sample) {
+        let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
+        let surface = self.world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);
+        let from_front = surface.ng.dot(dir) <= 0.0;
+        let ng = if from_front { surface.ng } else { -surface.ng };
+        let material = surface.material;
+        seen.distance = t * dir.length();
+        seen.position = surface.position;
+        seen.normal = ng;
+        seen.shading_normal = self.shading_normal(material, &surface, from_front, ng, -dir.normalize_or_zero());
+        seen.albedo = self.looks.look(material, &surface, from_front).base;
+        (seen.inst, seen.prim, seen.material) = (hits.inst[i], hits.prim[i], material);
+    }
+
+    /// The shading normal on the side of `ng`; `ng` itself where `out` is behind it.
+    fn shading_normal(&self, material: u32, surface: &Surface<'_>, from_front: bool, ng: DVec3, out: DVec3) -> DVec3 {
+        let ns = self.looks.bumped(material, surface);
+        let ns = if from_front { ns } else { -ns };
+        if ns.dot(out) > 1e-3 { ns } else { ng }
+    }
+}
+
+/// The fields of a point on a bare triangle; the rest is computed in packets.
+#[inline]
+fn raw_fields<S: Real>(wave: &Wave<S>, i: usize, hits: &Hits<S>, triangle: &[DVec3; 3], look: &Look) -> [S; FIELDS] {
+    let mut fields = [S::ZERO; FIELDS];
+    let mut put = |at: usize, v: DVec3| (0..3).for_each(|axis| fields[at + axis] = S::from_f64(v[axis]));
+    put(RAW_CORNER, triangle[0]);
+    put(RAW_EDGE1, triangle[1]);
+    put(RAW_EDGE2, triangle[2]);
+    put(BASE, look.base);
+    let dir = wave.rays.dir(i);
+    let length = dot(dir, dir).sqrt();
+    let back = -(S::ONE / length);
+    (0..3).for_each(|axis| fields[OUT + axis] = dir[axis] * back);
+    (0..4).for_each(|k| fields[PARAM + k] = S::from_f64(look.param[k]));
+    fields[RAW_PLACE] = hits.u[i];
+    fields[RAW_PLACE + 1] = hits.v[i];
+    fields[RAW_PLACE + 2] = hits.t[i] * length;
+    fields[THROUGHPUT..THROUGHPUT + 3].copy_from_slice(&wave.throughput[i]);
+    fields[SQUEEZE] = wave.squeeze[i];
+    fields
+}
+
+impl<S: Real> PathMemory<S> {
+    /// The primary rays as the first wave.
+    fn start(&mut self, rays: &Rays<S>) {
+        self.now.open(rays.len());
+        for i in 0..rays.len() {
+            if rays.is_live(i) {
+                self.now.push(i as u32, rays.org(i), rays.dir(i), [S::ONE; 3], S::INFINITY, S::ONE);
+            }
+        }
+        self.now.close();
+    }
+}

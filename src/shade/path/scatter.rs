@@ -1,0 +1,331 @@
+//! One bounce of the points of one model, packet by packet: a light is aimed at, a direction is chosen.
+
+use glam::DVec3;
+
+use super::Paths;
+use super::bsdf::Bsdf;
+use super::points::{NORMAL, OFFSET, OUT, POSITION, Points, SHADING, SQUEEZE, THROUGHPUT};
+use super::wave::{Shadows, Wave};
+use crate::camera::sobol::{PixelPoints, fraction};
+use crate::lanes::space::{Frame, choose, scale, sub};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot};
+
+/// Bounces before paths may end by chance.
+const FIRST_ROULETTE: u32 = 3;
+/// The largest chance to go on.
+const LARGEST_CHANCE: f64 = 0.95;
+/// Pairs of dimensions of a bounce; those of the camera come first.
+const PAIRS: u32 = 4;
+/// Pairs of the camera: the place in the pixel.
+const CAMERA_PAIRS: u32 = 1;
+
+/// A column of lanes in memory.
+type Column<S> = [S; MAX_LANES];
+
+/// The random numbers of a packet: place and choice of the direction, place and choice of the light, roulette.
+struct Numbers<S> {
+    place: [Column<S>; 2],
+    choice: Column<S>,
+    light: [Column<S>; 2],
+    light_choice: Column<S>,
+    roulette: Column<S>,
+}
+
+/// What points know of their paths.
+pub struct Chances<'a> {
+    /// Points of each path's pixel.
+    pub points: &'a [PixelPoints],
+    /// Number of the sample.
+    pub sample: u32,
+    /// Number of the bounce, 0 at the first hit.
+    pub bounce: u32,
+}
+
+impl Chances<'_> {
+    fn numbers<S: Real>(&self, path: &[u32]) -> Numbers<S> {
+        let zero = [S::ZERO; MAX_LANES];
+        let mut numbers =
+            Numbers { place: [zero; 2], choice: zero, light: [zero; 2], light_choice: zero, roulette: zero };
+        let mut keys = [PixelPoints::default(); MAX_LANES];
+        for (key, &path) in keys.iter_mut().zip(path) {
+            *key = self.points[path as usize];
+        }
+        let first = CAMERA_PAIRS + self.bounce * PAIRS;
+        let fill = |pair: u32, x: &mut Column<S>, y: &mut Column<S>| {
+            let mut bits = [[0; MAX_LANES]; 2];
+            for lane in 0..MAX_LANES {
+                let both = keys[lane].bits(self.sample, first + pair);
+                (bits[0][lane], bits[1][lane]) = (both[0], both[1]);
+            }
+            for lane in 0..MAX_LANES {
+                x[lane] = S::from_f64(fraction(bits[0][lane]));
+                y[lane] = S::from_f64(fraction(bits[1][lane]));
+            }
+        };
+        let [x, y] = &mut numbers.place;
+        fill(0, x, y);
+        let [x, y] = &mut numbers.light;
+        fill(1, x, y);
+        fill(2, &mut numbers.light_choice, &mut numbers.choice);
+        if self.bounce >= FIRST_ROULETTE {
+            fill(3, &mut numbers.roulette, &mut [S::ZERO; MAX_LANES]);
+        }
+        numbers
+    }
+}
+
+/// The points of a packet.
+struct Packet<V> {
+    position: Lanes3<V>,
+    normal: Lanes3<V>,
+    offset: V,
+    throughput: Lanes3<V>,
+    squeeze: V,
+    frame: Frame<V>,
+    /// To where the light goes, local.
+    out: Lanes3<V>,
+}
+
+impl<V: Lanes> Packet<V> {
+    #[inline(always)]
+    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
+        let frame = Frame::new(points.vector(SHADING, first));
+        let [x, y, z] = frame.to_local(points.vector(OUT, first));
+        Self {
+            position: points.vector(POSITION, first),
+            normal: points.vector(NORMAL, first),
+            offset: points.scalar(OFFSET, first),
+            throughput: points.vector(THROUGHPUT, first),
+            squeeze: points.scalar(SQUEEZE, first),
+            frame,
+            out: [x, y, z.fast_max(V::constant(1e-6))],
+        }
+    }
+
+    /// Origin of a ray in world direction `dir`, and whether it is on the same side of the surface as `local` is of
+    /// the shading normal's plane: where the two disagree light would leak.
+    #[inline(always)]
+    fn leave(&self, dir: Lanes3<V>, local: Lanes3<V>) -> (Lanes3<V>, V::Mask) {
+        let zero = V::constant(0.0);
+        let side = dot(dir, self.normal);
+        let step = V::select(zero.cmp_lt(side), self.offset, -self.offset);
+        let org = [0, 1, 2].map(|i| self.normal[i].mul_add(step, self.position[i]));
+        (org, zero.cmp_lt(side * local[2]))
+    }
+}
+
+#[inline(always)]
+fn spill<V: Lanes>(v: Lanes3<V>) -> [Column<V::Scalar>; 3] {
+    v.map(|x| {
+        let mut column = [V::Scalar::ZERO; MAX_LANES];
+        x.store(&mut column);
+        column
+    })
+}
+
+#[inline(always)]
+fn at<S: Copy>(columns: &[Column<S>; 3], lane: usize) -> [S; 3] {
+    [columns[0][lane], columns[1][lane], columns[2][lane]]
+}
+
+impl<S: Real> Paths<'_, S> {
+    /// Scatters at all `points`: rays into `next`, shadow rays into `shadows`.
+    pub(super) fn scatter<B: Bsdf<S::Wide>>(
+        &self,
+        points: &Points<S>,
+        chances: &Chances<'_>,
+        next: &mut Wave<S>,
+        shadows: &mut Shadows<S>,
+    ) {
+        let width = <S::Wide as Lanes>::N;
+        for first in (0..points.len()).step_by(width) {
+            let path = &points.path[first..points.len().min(first + width)];
+            let numbers = chances.numbers::<S>(path);
+            let packet = Packet::<S::Wide>::load(points, first);
+            let bsdf = B::load(points, first);
+            if !B::SMOOTH && !self.lights.is_empty() {
+                self.aim(&packet, &bsdf, path, &numbers, shadows);
+            }
+            go_on(&packet, &bsdf, path, &numbers, chances.bounce, next);
+        }
+    }
+
+    /// One shadow ray for each point of the packet that a light may reach.
+    #[inline(always)]
+    fn aim<B: Bsdf<S::Wide>>(
+        &self,
+        packet: &Packet<S::Wide>,
+        bsdf: &B,
+        path: &[u32],
+        numbers: &Numbers<S>,
+        shadows: &mut Shadows<S>,
+    ) {
+        let target = self.targets(packet, path, numbers);
+        let one = S::Wide::constant(1.0);
+        let local = packet.frame.to_local(target.dir);
+        let (org, is_consistent) = packet.leave(target.dir, local);
+        let found = bsdf.eval(packet.out, local);
+        let odds = found.pdf / target.pdf;
+        let share = one / odds.mul_add(odds, one);
+        let weight = S::Wide::select(target.is_point, one, share) / target.pdf;
+        let light: Lanes3<S::Wide> =
+            [0, 1, 2].map(|i| packet.throughput[i] * found.value[i] * (target.radiance[i] * weight));
+        let sum = light[0] + light[1] + light[2];
+        let wanted = is_consistent & S::Wide::constant(0.0).cmp_lt(sum) & sum.cmp_lt(S::Wide::splat(S::INFINITY));
+        // To a place: from the ray's own origin, ending before t = 1.
+        let dir = [0, 1, 2].map(|i| target.place[i] - org[i] * target.near);
+        let far = target.near.cmp_lt(one);
+        let t_max = S::Wide::select(far, S::Wide::splat(S::INFINITY), S::Wide::splat(self.shadow_end));
+        let (org, dir, light, [t_max, ..]) = (spill(org), spill(dir), spill(light), spill([t_max; 3]));
+        for lane in lanes_of(wanted.bits(), path.len()) {
+            shadows.push(path[lane], at(&org, lane), at(&dir, lane), t_max[lane], at(&light, lane));
+        }
+    }
+
+    /// Something that shines for each point of the packet, by chance.
+    #[inline(always)]
+    fn targets(&self, packet: &Packet<S::Wide>, path: &[u32], numbers: &Numbers<S>) -> Targets<S::Wide> {
+        let zero = [S::ZERO; MAX_LANES];
+        let (mut dir, mut radiance, mut target) = ([zero; 3], [zero; 3], [zero; 3]);
+        // Without light the density is 1 and the radiance 0.
+        let (mut pdf, mut near, mut points, mut even) = ([S::ONE; MAX_LANES], zero, 0, 0);
+        let mut flat = [zero; 19];
+        let position = spill(packet.position);
+        for lane in 0..path.len() {
+            let Some((index, chance)) = self.lights.choose(numbers.light_choice[lane].to_f64()) else { continue };
+            if let Some(triangle) = self.lights.flat(index) {
+                for (column, &number) in flat.iter_mut().zip(&triangle.numbers) {
+                    column[lane] = S::from_f64(number);
+                }
+                pdf[lane] = S::from_f64(chance);
+                even |= 1u32 << lane;
+                continue;
+            }
+            let from = DVec3::from(at(&position, lane).map(S::to_f64));
+            let place = [numbers.light[0][lane].to_f64(), numbers.light[1][lane].to_f64()];
+            let Some(aim) = self.lights.aim(from, (index, chance), place, self.world, &self.looks) else { continue };
+            for axis in 0..3 {
+                dir[axis][lane] = S::from_f64(aim.dir[axis]);
+                radiance[axis][lane] = S::from_f64(aim.radiance[axis]);
+                target[axis][lane] = S::from_f64(aim.target[axis]);
+            }
+            pdf[lane] = S::from_f64(aim.pdf);
+            near[lane] = if aim.is_far { S::ZERO } else { S::ONE };
+            points |= u32::from(aim.is_point) << lane;
+        }
+        let load = |columns: &[Column<S>; 3]| [0, 1, 2].map(|i| S::Wide::load(&columns[i]));
+        let others = Targets {
+            place: load(&target),
+            near: S::Wide::load(&near),
+            dir: load(&dir),
+            pdf: S::Wide::load(&pdf),
+            radiance: load(&radiance),
+            is_point: Mask::<S>::from_bits(points),
+        };
+        if even == 0 {
+            return others;
+        }
+        let light = [S::Wide::load(&numbers.light[0]), S::Wide::load(&numbers.light[1])];
+        let flat = flat.map(|column| S::Wide::load(&column));
+        on_triangles(packet.position, &flat, light, Mask::<S>::from_bits(even), &others)
+    }
+}
+
+/// Masks of packets.
+type Mask<S> = <<S as Real>::Wide as Lanes>::Mask;
+
+/// What a packet aims at.
+struct Targets<V: Lanes> {
+    /// The place, or far away the direction to it.
+    place: Lanes3<V>,
+    /// 1 for a place, 0 for a direction.
+    near: V,
+    /// Unit direction.
+    dir: Lanes3<V>,
+    /// Density per solid angle; of a point the chance of the light.
+    pdf: V,
+    /// Radiance from there; of a point irradiance.
+    radiance: Lanes3<V>,
+    /// Lights without extent.
+    is_point: V::Mask,
+}
+
+/// Uniform points of emitting triangles in the lanes `even`, whose chance is the density in `others`; `flat` are the
+/// numbers of [`super::emitter::Flat`].
+/// Source of the map: E. Heitz, *A Low-Distortion Map Between Triangle and Square*, 2019.
+#[inline(always)]
+fn on_triangles<V: Lanes>(
+    from: Lanes3<V>,
+    flat: &[V; 19],
+    [u, v]: [V; 2],
+    even: V::Mask,
+    others: &Targets<V>,
+) -> Targets<V> {
+    let (zero, one, half) = (V::constant(0.0), V::constant(1.0), V::constant(0.5));
+    let vector = |k: usize| [flat[3 * k], flat[3 * k + 1], flat[3 * k + 2]];
+    let upper = u.cmp_lt(v);
+    let b = V::select(upper, half * u, u - half * v);
+    let c = V::select(upper, v - half * u, half * v);
+    let (corner, e1, e2, normal) = (vector(0), vector(1), vector(2), vector(3));
+    let place: Lanes3<V> = [0, 1, 2].map(|i| c.mul_add(e2[i], b.mul_add(e1[i], corner[i])));
+    let away = sub(place, from);
+    let square = dot(away, away);
+    let dir = scale(away, one / square.sqrt());
+    let cosine = dot(dir, normal);
+    let radiance = choose(cosine.cmp_lt(zero), vector(4), vector(5));
+    let pdf = others.pdf * square / (cosine.abs() * flat[18]);
+    // Seen edge on, or from where it is, it gives nothing.
+    let seen = even & pdf.cmp_lt(V::splat(V::Scalar::INFINITY)) & zero.cmp_lt(pdf);
+    Targets {
+        place: choose(even, place, others.place),
+        near: V::select(even, one, others.near),
+        dir: choose(seen, dir, others.dir),
+        pdf: V::select(seen, pdf, others.pdf),
+        radiance: choose(seen, radiance, others.radiance),
+        is_point: others.is_point,
+    }
+}
+
+/// The set bits of `bits` below `count`.
+#[inline(always)]
+fn lanes_of(bits: u32, count: usize) -> impl Iterator<Item = usize> {
+    let mut bits = bits & ((1u32 << count) - 1);
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros() as usize;
+        (bits != 0).then(|| {
+            bits &= bits - 1;
+            lane
+        })
+    })
+}
+
+/// The next ray of each path of the packet that goes on.
+#[inline(always)]
+fn go_on<S: Real, B: Bsdf<S::Wide>>(
+    packet: &Packet<S::Wide>,
+    bsdf: &B,
+    path: &[u32],
+    numbers: &Numbers<S>,
+    bounce: u32,
+    next: &mut Wave<S>,
+) {
+    let (zero, one) = (S::Wide::constant(0.0), S::Wide::constant(1.0));
+    let place = [S::Wide::load(&numbers.place[0]), S::Wide::load(&numbers.place[1])];
+    let sampled = bsdf.sample(packet.out, place, S::Wide::load(&numbers.choice));
+    let dir = packet.frame.to_world(sampled.wi);
+    let (org, is_consistent) = packet.leave(dir, sampled.wi);
+    let mut throughput = [0, 1, 2].map(|i| packet.throughput[i] * sampled.weight[i]);
+    let squeeze = packet.squeeze * sampled.squeeze;
+    let largest = throughput[0].fast_max(throughput[1]).fast_max(throughput[2]);
+    let mut alive = is_consistent & zero.cmp_lt(largest) & largest.cmp_lt(S::Wide::splat(S::INFINITY));
+    if bounce >= FIRST_ROULETTE {
+        let chance = (largest * squeeze).fast_min(S::Wide::constant(LARGEST_CHANCE));
+        alive = alive & S::Wide::load(&numbers.roulette).cmp_lt(chance);
+        throughput = choose(alive, throughput.map(|t| t / chance), throughput);
+    }
+    let (org, dir, throughput) = (spill(org), spill(dir), spill(throughput));
+    let [pdf, squeeze, _] = spill([sampled.pdf, squeeze, one]);
+    for lane in lanes_of(alive.bits(), path.len()) {
+        next.push(path[lane], at(&org, lane), at(&dir, lane), at(&throughput, lane), pdf[lane], squeeze[lane]);
+    }
+}

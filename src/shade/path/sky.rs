@@ -1,0 +1,171 @@
+//! Light from an environment picture, sampled by its brightness.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+
+use crate::scene::light::Environment;
+use crate::scene::material::{TextureRef, Wrap};
+
+/// An environment made ready.
+#[derive(Debug)]
+pub struct Sky<'a> {
+    environment: &'a Environment,
+    columns: usize,
+    rows: usize,
+    /// Per row: sums of brightness times solid angle up to and with each column, the last one 1.
+    in_row: Vec<f32>,
+    /// The same of whole rows.
+    of_rows: Vec<f32>,
+    /// Integral of brightness over all directions.
+    brightness: f64,
+}
+
+/// How the picture is looked up.
+const LOOKUP: TextureRef = TextureRef {
+    texture: 0,
+    uv_set: 0,
+    transform: glam::DAffine2::IDENTITY,
+    wrap: [Wrap::Repeat, Wrap::Clamp],
+    nearest: false,
+};
+
+impl<'a> Sky<'a> {
+    /// `environment` made ready.
+    pub fn new(environment: &'a Environment) -> Self {
+        let (columns, rows) = (environment.texture.width as usize, environment.texture.height as usize);
+        let (mut in_row, mut of_rows) = (Vec::with_capacity(columns * rows), Vec::with_capacity(rows));
+        let mut total = 0.0;
+        for row in 0..rows {
+            let edge = |i: usize| (PI * i as f64 / rows as f64).cos();
+            let solid_angle = TAU / columns as f64 * (edge(row) - edge(row + 1));
+            let weights: Vec<f64> = (0..columns)
+                .map(|column| {
+                    let uv = [(column as f64 + 0.5) / columns as f64, (row as f64 + 0.5) / rows as f64];
+                    let color = environment.texture.sample(&LOOKUP, uv);
+                    let light = DVec3::new(color[0].into(), color[1].into(), color[2].into()) * environment.scale;
+                    (light.element_sum() / 3.0).max(0.0) * solid_angle
+                })
+                .map(|w| if w.is_finite() { w } else { 0.0 })
+                .collect();
+            let sum: f64 = weights.iter().sum();
+            total += sum;
+            of_rows.push(total);
+            let mut up_to = 0.0;
+            in_row.extend(weights.iter().map(|w| {
+                up_to += w;
+                (if sum > 0.0 { up_to / sum } else { 1.0 }) as f32
+            }));
+        }
+        let of_rows = of_rows.iter().map(|sum| (if total > 0.0 { sum / total } else { 1.0 }) as f32).collect();
+        Self { environment, columns, rows, in_row, of_rows, brightness: total }
+    }
+
+    /// Integral of the radiance's brightness over all directions.
+    pub fn brightness(&self) -> f64 {
+        self.brightness
+    }
+
+    /// Radiance from direction `dir` (where one looks; need not be unit).
+    pub fn radiance(&self, dir: DVec3) -> DVec3 {
+        let color = self.environment.texture.sample(&LOOKUP, self.place(dir));
+        let light = DVec3::new(color[0].into(), color[1].into(), color[2].into()) * self.environment.scale;
+        // A picture may hold anything.
+        if light.is_finite() { light.max(DVec3::ZERO) } else { DVec3::ZERO }
+    }
+
+    fn place(&self, dir: DVec3) -> [f64; 2] {
+        let d = (self.environment.to_world.transpose() * dir).normalize_or(DVec3::NEG_Z);
+        [0.5 + d.x.atan2(-d.z) / TAU, d.y.clamp(-1.0, 1.0).acos() / PI]
+    }
+
+    /// A direction by brightness, unit, world space, and its density per solid angle.
+    pub fn sample(&self, place: [f64; 2]) -> Option<(DVec3, f64)> {
+        if self.brightness <= 0.0 {
+            return None;
+        }
+        let (row, y) = invert(&self.of_rows, place[1]);
+        let (column, x) = invert(&self.in_row[row * self.columns..][..self.columns], place[0]);
+        let longitude = ((column as f64 + x) / self.columns as f64 - 0.5) * TAU;
+        // Uniform in the cosine of the latitude within the row.
+        let edge = |i: usize| (PI * i as f64 / self.rows as f64).cos();
+        let cos = edge(row) + (edge(row + 1) - edge(row)) * y;
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let local = DVec3::new(sin * longitude.sin(), cos, -sin * longitude.cos());
+        Some((self.environment.to_world * local, self.cell_pdf(row, column)))
+    }
+
+    /// Density of [`Self::sample`] in direction `dir`.
+    pub fn pdf(&self, dir: DVec3) -> f64 {
+        if self.brightness <= 0.0 {
+            return 0.0;
+        }
+        let [u, v] = self.place(dir);
+        let cell = |x: f64, count: usize| ((x * count as f64) as usize).min(count - 1);
+        self.cell_pdf(cell(v, self.rows), cell(u, self.columns))
+    }
+
+    fn cell_pdf(&self, row: usize, column: usize) -> f64 {
+        let step = |sums: &[f32], i: usize| f64::from(sums[i]) - if i > 0 { f64::from(sums[i - 1]) } else { 0.0 };
+        let edge = |i: usize| (PI * i as f64 / self.rows as f64).cos();
+        let solid_angle = TAU / self.columns as f64 * (edge(row) - edge(row + 1));
+        let in_row = &self.in_row[row * self.columns..][..self.columns];
+        step(&self.of_rows, row) * step(in_row, column) / solid_angle
+    }
+}
+
+/// The cell of `sums` in which `u` falls, and where inside.
+fn invert(sums: &[f32], u: f64) -> (usize, f64) {
+    let cell = sums.partition_point(|&sum| f64::from(sum) <= u).min(sums.len() - 1);
+    let below = if cell > 0 { f64::from(sums[cell - 1]) } else { 0.0 };
+    let width = f64::from(sums[cell]) - below;
+    (cell, if width > 0.0 { ((u - below) / width).clamp(0.0, 1.0) } else { 0.5 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::sampling::PixelRandom;
+    use crate::scene::texture::{Texels, Texture};
+    use glam::DMat3;
+
+    fn environment() -> Environment {
+        // Dim, with one bright texel up and to the right.
+        let texel = |i: u32| if i == 8 + 6 { [90.0, 60.0, 30.0, 1.0] } else { [0.5, 0.6, 0.7, 1.0] };
+        let texels = Texels::Float((0..32).map(texel).collect());
+        let texture = Texture { name: String::new(), width: 8, height: 4, texels };
+        let to_world = DMat3::from_rotation_y(0.7);
+        Environment { texture: texture.into(), scale: DVec3::splat(2.0), to_world }
+    }
+
+    #[test]
+    fn directions_have_the_density_they_say_and_integrate_to_the_radiance() {
+        let environment = environment();
+        let sky = Sky::new(&environment);
+        let (n, random) = (200_000, PixelRandom::new(1, 2, 3));
+        let (mut by_light, mut uniform, mut area) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+        for k in 0..n {
+            let u = random.spread(k, 0);
+            let (dir, pdf) = sky.sample(u).unwrap();
+            assert!((dir.length() - 1.0).abs() < 1e-9 && (sky.pdf(dir) / pdf - 1.0).abs() < 1e-2 || k % 97 != 0);
+            by_light += sky.radiance(dir) / pdf / f64::from(n);
+            area += 1.0 / pdf / f64::from(n);
+            let z = 1.0 - 2.0 * u[0];
+            let s = (1.0 - z * z).sqrt();
+            let any = DVec3::new(s * (TAU * u[1]).cos(), z, s * (TAU * u[1]).sin());
+            uniform += sky.radiance(any) * 4.0 * PI / f64::from(n);
+        }
+        assert!((area / (4.0 * PI) - 1.0).abs() < 0.01, "densities integrate to one: {area}");
+        assert!(((by_light - uniform) / uniform).abs().max_element() < 0.01, "{by_light} {uniform}");
+    }
+
+    #[test]
+    fn the_middle_is_ahead_and_x_to_the_right() {
+        let mut environment = environment();
+        environment.to_world = DMat3::IDENTITY;
+        let sky = Sky::new(&environment);
+        assert_eq!(sky.place(DVec3::NEG_Z), [0.5, 0.5]);
+        assert_eq!(sky.place(DVec3::X * 3.0), [0.75, 0.5]);
+        assert_eq!(sky.place(DVec3::Y)[1], 0.0);
+    }
+}

@@ -1,0 +1,88 @@
+//! The rays of one bounce of many paths, with what they carry, and the shadow rays that go with them.
+
+use crate::lanes::Real;
+use crate::ray::Rays;
+
+/// Rays and what their paths carry, in parallel.
+#[derive(Clone, Debug)]
+pub struct Wave<S> {
+    /// The rays; directions are unit after the first bounce.
+    pub rays: Rays<S>,
+    /// Path of each.
+    pub path: Vec<u32>,
+    /// What of the radiance along the ray reaches the eye.
+    pub throughput: Vec<[S; 3]>,
+    /// Density with which the direction was found, per solid angle; infinite if no light could be aimed at.
+    pub pdf: Vec<S>,
+    /// Product of the squared relative indices of refraction that the throughput was divided by.
+    pub squeeze: Vec<S>,
+}
+
+impl<S: Real> Default for Wave<S> {
+    fn default() -> Self {
+        Self { rays: Rays::new(0), path: Vec::new(), throughput: Vec::new(), pdf: Vec::new(), squeeze: Vec::new() }
+    }
+}
+
+impl<S: Real> Wave<S> {
+    /// Empty, with room for `count` rays.
+    pub fn open(&mut self, count: usize) {
+        self.rays.reset(count);
+        self.path.clear();
+        self.throughput.clear();
+        self.pdf.clear();
+        self.squeeze.clear();
+    }
+
+    /// Adds a ray with an open end.
+    pub fn push(&mut self, path: u32, org: [S; 3], dir: [S; 3], throughput: [S; 3], pdf: S, squeeze: S) {
+        self.rays.set(self.path.len(), org, dir, S::ZERO, S::INFINITY);
+        self.path.push(path);
+        self.throughput.push(throughput);
+        self.pdf.push(pdf);
+        self.squeeze.push(squeeze);
+    }
+
+    /// Ends the additions.
+    pub fn close(&mut self) {
+        self.rays.truncate(self.path.len());
+    }
+}
+
+/// Shadow rays and what arrives if nothing is in between.
+#[derive(Clone, Debug)]
+pub struct Shadows<S> {
+    /// The rays.
+    pub rays: Rays<S>,
+    /// Path of each.
+    pub path: Vec<u32>,
+    /// What arrives at the eye.
+    pub light: Vec<[S; 3]>,
+}
+
+impl<S: Real> Default for Shadows<S> {
+    fn default() -> Self {
+        Self { rays: Rays::new(0), path: Vec::new(), light: Vec::new() }
+    }
+}
+
+impl<S: Real> Shadows<S> {
+    /// Empty, with room for `count` rays.
+    pub fn open(&mut self, count: usize) {
+        self.rays.reset(count);
+        self.path.clear();
+        self.light.clear();
+    }
+
+    /// Adds a ray.
+    pub fn push(&mut self, path: u32, org: [S; 3], dir: [S; 3], t_max: S, light: [S; 3]) {
+        self.rays.set(self.path.len(), org, dir, S::ZERO, t_max);
+        self.path.push(path);
+        self.light.push(light);
+    }
+
+    /// Ends the additions.
+    pub fn close(&mut self) {
+        self.rays.truncate(self.path.len());
+    }
+}
