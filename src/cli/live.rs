@@ -111,7 +111,7 @@ fn source(args: &SceneArgs) -> Result<Source> {
     let file = (!name.starts_with("builtin:")).then(|| PathBuf::from(&name));
     let meshes = Meshes::default();
     let open = move |before: Option<&dyn Stage>| {
-        let description = options.load_with(&name, &|path| meshes.read(path))?;
+        let description = options.load_with(&name, &|path, references| meshes.read(path, references))?;
         if before.is_some_and(|before| before.description().hash == description.hash) {
             return Ok(None);
         }

@@ -5,11 +5,11 @@ use std::f64::consts::{PI, TAU};
 use glam::{DAffine3, DVec3};
 
 use super::lights::in_cone;
-use super::look::Looks;
 use crate::lanes::Real;
 use crate::scene::description::Light;
 use crate::scene::world::World;
 use crate::shade::lights::spot_share;
+use crate::shade::look::Looks;
 
 /// Something that shines.
 #[derive(Clone, Copy, Debug)]

@@ -6,12 +6,12 @@ use glam::DVec3;
 
 use super::alias::Alias;
 use super::emitter::{Aim, Emitter, Flat};
-use super::look::Looks;
 use super::sky::Sky;
 use crate::lanes::Real;
 use crate::scene::assembly::{Part, PartKind};
 use crate::scene::description::{Description, Light, Shape};
 use crate::scene::world::World;
+use crate::shade::look::Looks;
 
 /// Emitting primitives of an object: first primitive, number, and how many of the object come before.
 type Run = (u32, u32, u32);

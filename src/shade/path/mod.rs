@@ -15,33 +15,35 @@ mod alias;
 mod bsdf;
 mod emitter;
 mod lights;
-mod look;
 mod points;
 mod scatter;
 mod sky;
 mod stats;
-mod through;
 mod wave;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
 
+pub(super) use self::bsdf::fresnel;
 pub use self::stats::{BounceStats, PathStats};
 
 use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
 };
 use self::lights::Lights;
-use self::look::{Look, Looks, Model};
 use self::points::{
     BASE, FIELDS, NORMAL, OFFSET, OUT, PARAM, POSITION, Points, RAW_CORNER, RAW_EDGE1, RAW_EDGE2, RAW_PLACE, SHADING,
     SQUEEZE, THROUGHPUT,
 };
 use self::scatter::Chances;
 use self::wave::{Shadows, Wave};
+use super::look::{Look, Looks, Model};
 use super::offset::position_error;
-use super::shader::{Sample, Settings, Workspace};
+use super::sample::Sample;
+use super::shader::{Settings, Workspace};
+use super::through::{Again, MIXTURE, Through, number};
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::{Real, dot};
 use crate::ray::{Hits, Rays};
@@ -56,7 +58,7 @@ const SHADOW_ROUNDINGS: f64 = 256.0;
 pub(super) struct Paths<'a, S: Real> {
     world: &'a World<S>,
     engine: &'a dyn Engine<S>,
-    looks: Looks<'a>,
+    looks: Arc<Looks<'a>>,
     lights: Lights<'a>,
     /// Scatterings of a path at most.
     depth: u32,
@@ -74,7 +76,7 @@ pub(super) struct PathMemory<S> {
     now: Wave<S>,
     next: Wave<S>,
     shadows: Shadows<S>,
-    again: through::Again<S>,
+    again: Again<S>,
     /// What was counted.
     pub stats: PathStats,
 }
@@ -87,7 +89,7 @@ impl<S: Real> Default for PathMemory<S> {
             now: Wave::default(),
             next: Wave::default(),
             shadows: Shadows::default(),
-            again: through::Again::default(),
+            again: Again::default(),
             stats: PathStats::default(),
         }
     }
@@ -99,11 +101,11 @@ impl<'a, S: Real> Paths<'a, S> {
     pub fn new(
         world: &'a World<S>,
         description: &'a Description,
+        looks: Arc<Looks<'a>>,
         engine: &'a dyn Engine<S>,
         headlight: Light,
         settings: &Settings,
     ) -> Self {
-        let looks = Looks::new(description);
         let lights = Lights::new(world, description, &looks, headlight);
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
         let Settings { depth, seed, first_hits, .. } = *settings;
@@ -145,7 +147,11 @@ impl<'a, S: Real> Paths<'a, S> {
     ) {
         let live = memory.now.path.len() as u64;
         let clock = Instant::now();
-        self.closest(bounce, sample, memory, work);
+        let through = Through { world: self.world, engine: self.engine, looks: &self.looks };
+        let (pixels, paths) = (&memory.pixels, &memory.now.path);
+        through.closest(&memory.now.rays, &mut work.hits, &mut work.scratch, &mut memory.again, None, |i, layer| {
+            number(pixels[paths[i] as usize], sample, bounce, layer)
+        });
         let traced = clock.elapsed();
         memory.points.iter_mut().for_each(Points::clear);
         for i in 0..memory.now.path.len() {
@@ -167,13 +173,17 @@ impl<'a, S: Real> Paths<'a, S> {
         work.rays.shadow += stats.shadows;
         // The primary rays are counted already.
         work.rays.scattered += if bounce == 0 { 0 } else { live };
-        self.shadows(memory, work, |path, light| {
+        let shadows = &memory.shadows;
+        let (hits, occluded, scratch) = (&mut work.hits, &mut work.occluded, &mut work.scratch);
+        let left = through.shadows(&shadows.rays, hits, occluded, scratch, &mut memory.again, false, None);
+        for ((&path, light), &left) in shadows.path.iter().zip(&shadows.light).zip(left) {
+            let light = DVec3::from(light.map(S::to_f64)) * left;
             let seen = &mut out[path as usize];
             seen.radiance += light;
             if bounce == 0 {
                 seen.direct += light;
             }
-        });
+        }
         stats.shadowing = clock.elapsed();
         memory.stats.add(bounce, &stats);
     }
@@ -268,7 +278,7 @@ impl<'a, S: Real> Paths<'a, S> {
         if bounce > 0 && bounce == self.depth {
             return;
         }
-        let choice = || through::number(memory.pixels[path as usize], sample, bounce, through::MIXTURE);
+        let choice = || number(memory.pixels[path as usize], sample, bounce, MIXTURE);
         let material =
             if self.looks.has_mixtures { self.looks.resolve(surface.material, choice()) } else { surface.material };
         let look = self.looks.look(material, &surface, from_front);
