@@ -8,13 +8,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use self::report::{Made, report, tell};
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
 use super::picture::{Format, Target, target, write};
+use super::preview::{Job, PreviewArgs};
 use crate::camera::Filter;
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::exr::ImageInfo;
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
-use crate::render::{Aov, Progress, RenderOptions, render};
+use crate::render::{Aov, Progress, RenderOptions};
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
 use crate::shade::{Integrator, unknown_shaders};
@@ -43,6 +44,7 @@ Examples:
   lanecast render model.obj -o near.png --eye 0,1,5 --look-at 0,1,0 --fov 35
   lanecast render moss.asc --top all.g --view moss.rt --rt-compat --size 512x512 -o moss.pix
   lanecast render m35.asc --az 90 --el 0 --lenient -o front.png
+  lanecast render builtin:forest -o forest.exr --spp 64 --preview tev
 
 The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as
 float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy), .pix (BRL-CAD's: linear,
@@ -108,6 +110,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "PIXELS", default_value_t = 32)]
     tile: u32,
     #[command(flatten)]
+    preview: PreviewArgs,
+    #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
     pub(super) output: OutputArgs,
@@ -152,6 +156,7 @@ impl RenderArgs {
             exposure: 0.0,
             engine: EngineArgs::default(),
             tile: 32,
+            preview: PreviewArgs::default(),
             threads,
             output: OutputArgs::default(),
         }
@@ -241,13 +246,23 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
 }
 
 fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
-    let engine = args.engine.find::<S>()?;
+    let engine = args.engine.for_blocks(args.preview.by_blocks()).find::<S>()?;
     let world = World::<S>::compile(description, args.scene.options.preset())?;
     let (width, height) = (options.width, options.height);
     let camera_args = if args.rt_compat { args.camera.or_default_view() } else { args.camera.clone() };
     let camera = camera_args.ready(description, world.bounds(), (width, height))?;
     let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
-    let output = render(&world, description, &camera, options, &watch)?;
+    let job = Job {
+        engine,
+        world: &world,
+        description,
+        camera: &camera,
+        options,
+        exposure: args.exposure,
+        name: &args.file.path.display().to_string(),
+        output: &args.output,
+    };
+    let output = job.render(&args.preview, &watch)?;
     watch.bar.finish_and_clear();
     let info = ImageInfo {
         software: concat!("lanecast ", env!("CARGO_PKG_VERSION")).into(),
