@@ -39,6 +39,8 @@ const EXAMPLES: &str = "\
 Examples:
   lanecast render builtin:sphere-flake -o flake.png
   lanecast render model.ply -o model.exr --aov Z,N,id.primitive --spp 16
+  lanecast render builtin:cornell --integrator path --spp 256 -o box.exr -o box.png --stats
+  lanecast render scene.glb --integrator path --noise 0.02 --time-limit 60 -o scene.exr --filter blackman-harris
   lanecast render model.ply -o ao.png --integrator ao --ao-samples 64 --exposure 0.5
   lanecast render scene.kdl -o cut.exr --size 1920x1080 --crop 100,100,400,300 --camera side
   lanecast render model.obj -o near.png --eye 0,1,5 --look-at 0,1,0 --fov 35
@@ -56,9 +58,9 @@ float, shape (height, width, 4); each further plane in a file beside it, NAME.PL
 pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// File to write: .exr, .png, .npy or .pix
-    #[arg(short = 'o', long = "output", value_name = "FILE", value_parser = target)]
-    file: Target,
+    /// File to write: .exr, .png, .npy or .pix; several -o write the same picture in several formats
+    #[arg(short = 'o', long = "output", value_name = "FILE", required = true, value_parser = target)]
+    files: Vec<Target>,
     #[command(flatten)]
     camera: CameraArgs,
     /// Part of the picture to render, pixels, y down, half open
@@ -134,11 +136,16 @@ impl Progress for Watch {
 }
 
 impl RenderArgs {
+    /// The first file to write.
+    fn file(&self) -> String {
+        self.files.first().map(|file| file.path.display().to_string()).unwrap_or_default()
+    }
+
     /// The arguments of a plain EXR picture of a scene: what a bench leaves beside its rows.
     pub(super) fn plain(scene: SceneArgs, camera: CameraArgs, threads: ThreadArgs, path: PathBuf) -> Self {
         Self {
             scene,
-            file: Target { path, format: Format::Exr },
+            files: vec![Target { path, format: Format::Exr }],
             camera,
             crop: None,
             integrator: Integrator::Whitted,
@@ -239,7 +246,8 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         count: args.output.verbose > 0,
     };
     options.check()?;
-    if matches!(args.file.format, Format::Png | Format::Pix) && !options.aovs.is_empty() {
+    let holds_planes = |file: &Target| !matches!(file.format, Format::Png | Format::Pix);
+    if !options.aovs.is_empty() && !args.files.iter().any(holds_planes) {
         return Err(Error::Usage("PNG and .pix hold colours only: --aov needs .exr or .npy".into()));
     }
     Ok(options)
@@ -259,7 +267,7 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
         camera: &camera,
         options,
         exposure: args.exposure,
-        name: &args.file.path.display().to_string(),
+        name: &args.file(),
         output: &args.output,
     };
     let output = job.render(&args.preview, &watch)?;
@@ -281,7 +289,7 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
     };
     // Without a finished tile there is nothing to show, and an older picture is worth more.
     if output.tiles_done > 0 {
-        write(&args.file, &output.film, &info, args.exposure)?;
+        args.files.iter().try_for_each(|file| write(file, &output.film, &info, args.exposure))?;
     }
     let made = Made { engine: engine.name(), precision: S::PRECISION, build_seconds: world.stats().build_seconds };
     tell(args, &report(args, options, &output, &made), &output)?;
