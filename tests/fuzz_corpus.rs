@@ -96,3 +96,21 @@ fn experiment_corpus() {
         assert_eq!(accepted, name != "misspelt.kdl", "{name}");
     }
 }
+
+#[test]
+fn mtl_corpus() {
+    let parse = |file: &Path, bytes: &[u8]| lanecast::scene::mtl::parse(file, bytes).is_ok();
+    for (name, accepted) in verdicts("mtl", parse).into_iter().filter(|(name, _)| name.contains('.')) {
+        assert_eq!(accepted, !["no_name.mtl", "two_numbers.mtl"].contains(&name.as_str()), "{name}");
+    }
+}
+
+#[test]
+fn picture_corpus() {
+    use lanecast::scene::pictures::{Curve, decode};
+    const BROKEN: [&str; 5] = ["huge.png", "lie.png", "lie.hdr", "text.png", "truncated.jpg"];
+    let parse = |_: &Path, bytes: &[u8]| decode("corpus", bytes, Curve::Srgb).is_ok();
+    for (name, accepted) in verdicts("picture", parse).into_iter().filter(|(name, _)| name.contains('.')) {
+        assert_eq!(accepted, !BROKEN.contains(&name.as_str()), "{name}");
+    }
+}

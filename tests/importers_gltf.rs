@@ -175,22 +175,6 @@ fn cameras_stand_where_their_nodes_are() {
 }
 
 #[test]
-fn materials_have_their_base_colour() {
-    let scene = scene(
-        r#""nodes": [{"mesh": 0}], "materials": [{"name": "a"}, {"pbrMetallicRoughness":
-            {"baseColorFactor": [1, 0.5, 0, 1], "baseColorTexture": {"index": 0}}}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 1}]}],
-        "accessors": [{"componentType": 5126, "count": 3, "type": "VEC3"}]"#,
-        &[],
-    );
-    assert_eq!(scene.materials.len(), 3, "the default and two");
-    assert_eq!((scene.materials[1].name.as_str(), scene.materials[2].name.as_str()), ("a", "material 1"));
-    assert_eq!(scene.materials[2].diffuse, DVec3::new(0.8, 0.4, 0.0));
-    assert_eq!(scene.groups[1].items[0].material, Some(2));
-    assert!(scene.warnings[0].starts_with("textures are not read: 1 materials"), "{:?}", scene.warnings);
-}
-
-#[test]
 fn hidden_nodes_are_left_out() {
     let scene = one_mesh(r#""nodes": [{"mesh": 0}, {"scale": [0, 0, 0], "children": [2]}, {"mesh": 0}]"#);
     assert_eq!(world(&scene).len(), 1);

@@ -62,6 +62,8 @@ const EDITS: &[(&str, &str, &str)] = &[
     (r#""scene": 0"#, r#""extensionsRequired": ["KHR_draco_mesh_compression"]"#, "`KHR_draco_mesh_compression` is not"),
     (r#""scene": 0"#, r#""extensionsRequired": ["EXT_meshopt_compression"]"#, "write the file again without"),
     (r#""scene": 0"#, r#""extensionsRequired": ["KHR_texture_transform", "X_y"]"#, "extensionsRequired[1]"),
+    (r#""scene": 0"#, r#""extensionsRequired": ["KHR_texture_basisu"]"#, "`KHR_texture_basisu` is not supported"),
+    (r#""scene": 0"#, r#""extensionsRequired": ["EXT_texture_webp"]"#, "with its pictures as PNG or JPEG"),
     (r#""scene": 0"#, r#""scene": "#, "byte "),
     (r#""scene": 0"#, r#""scene": 0, "scene": 0"#, "duplicate field `scene`"),
 ];

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use lanecast::scene::reference::References;
-use lanecast::scene::{gltf, obj, ply, stl};
+use lanecast::scene::{gltf, mtl, obj, ply, stl};
 
 /// Tells the process to be the measuring one; its value is the file.
 const FILE: &str = "LANECAST_TEST_MEMORY_FILE";
@@ -27,6 +27,7 @@ fn measure(file: &Path) {
     let before = both();
     let is_read = match file.extension().and_then(|e| e.to_str()) {
         Some("obj") => obj::parse(file, &bytes).map(drop),
+        Some("mtl") => mtl::parse(file, &bytes).map(drop),
         Some("ply") => ply::parse(file, &bytes).map(drop),
         Some("gltf" | "glb") => {
             let references = References { folder: None, allow_outside: false };
@@ -133,6 +134,8 @@ fn dense_files_stay_below_the_stated_bounds() {
         (64_u32, "vertices.obj", repeated("", "v 0 0 0\n")),
         (64, "polygon.obj", repeated("v 0 0 0\nf", " 1")),
         (64, "runs.obj", repeated(&long_name, "g a\nf 1 1 1\ng b\nf 1 1 1\n")),
+        (64, "mixed.obj", repeated("v 0 0 0\nvt 0\nvn 0 0 1\nf 1/1/1 1/1/1 1/1/1\nf", " 1")),
+        (128, "materials.mtl", repeated("", "newmtl a\n")),
         (64, "libraries.obj", repeated("", "mtllib a\n")),
         (40, "polygon.ply", ply_file("binary_little_endian", 1, 1, &polygon)),
         (40, "vertices.ply", ply_file("binary_little_endian", SIZE as u64 / 3, 0, &vec![1; SIZE / 3 * 3])),
@@ -141,7 +144,7 @@ fn dense_files_stay_below_the_stated_bounds() {
         (64, "nodes.gltf", gltf_list(SIZE, "", "nodes", "{}")),
         (64, "placed.gltf", gltf_list(SIZE, "\"meshes\": [{}],", "nodes", "{\"mesh\":0}")),
         (64, "groups.gltf", gltf_list(SIZE, "", "nodes", "{\"children\":[]}")),
-        (64, "materials.gltf", gltf_list(SIZE, "", "materials", "{}")),
+        (64, "materials.gltf", gltf_list(SIZE, "", "materials", "{\"doubleSided\":true}")),
         (64, "meshes.gltf", gltf_list(SIZE, "", "meshes", "{}")),
         (64, "names.gltf", gltf_list(SIZE, "", "extensionsUsed", "\"a\"")),
         (64, "strip.glb", strip_glb(SIZE)),

@@ -114,7 +114,7 @@ const ERRORS: &[(&str, &str, &str)] = &[
     ("camera { eye 0 0 1; fov 40; parallel 2 }", "1:29", "not both"),
     ("camera a { eye 0 0 1 }; camera a { eye 0 0 2 }", "1:25", "defined twice"),
     ("light point { intensity 1 }", "1:1", "needs a `position`"),
-    ("light", "1:1", "expected `light point`"),
+    ("light", "1:1", "expected one of `light point`"),
     ("background 1 2", "1:1", "found 2"),
     // Transforms.
     ("sphere { scale 0 }", "1:10", "cannot be inverted"),

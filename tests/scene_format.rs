@@ -7,8 +7,10 @@ use glam::DVec3;
 use lanecast::error::Error;
 use lanecast::scene::assembly::{Assembly, PartKind};
 use lanecast::scene::description::{Description, ItemKind, Shape};
-use lanecast::scene::kdl::{meshes::MeshFiles, parse};
+use lanecast::scene::kdl::meshes::{MeshFile, MeshFiles};
+use lanecast::scene::kdl::parse;
 use lanecast::scene::load::{LoadOptions, load};
+use lanecast::scene::obj::looks::Looks;
 use lanecast::scene::{builtin, mesh::Mesh};
 
 fn file_of(name: &str) -> PathBuf {
@@ -135,7 +137,8 @@ fn the_examples_of_the_reference_are_scenes() {
     for name in ["teapot.ply", "bolt.stl"] {
         std::fs::write(folder.path().join(name), "").unwrap();
     }
-    let read = |_: &Path| Ok(lanecast::scene::kdl::meshes::MeshFile { mesh: Mesh::default(), digest: [0; 32] });
+    let file = || MeshFile { mesh: Mesh::default(), digest: [0; 32], looks: Looks::default() };
+    let read = |_: &Path| Ok(file());
     let files = MeshFiles { folder: Some(folder.path()), allow_outside: false, read: &read };
     for example in examples {
         let scene = parse(Path::new("docs/SCENES.md"), "example", example.as_bytes(), &[], &files);

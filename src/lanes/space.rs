@@ -32,6 +32,12 @@ pub fn choose<V: Lanes>(mask: V::Mask, a: Lanes3<V>, b: Lanes3<V>) -> Lanes3<V> 
     [V::select(mask, a[0], b[0]), V::select(mask, a[1], b[1]), V::select(mask, a[2], b[2])]
 }
 
+/// Cross product, unfused: exactly antisymmetric.
+#[inline(always)]
+pub fn cross<V: Lanes>(a: Lanes3<V>, b: Lanes3<V>) -> Lanes3<V> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
 /// `a` made unit; NaN for a zero vector.
 #[inline(always)]
 pub fn normalize<V: Lanes>(a: Lanes3<V>) -> Lanes3<V> {

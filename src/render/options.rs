@@ -141,6 +141,7 @@ impl RenderOptions {
             ao_radius: self.ao_radius,
             seed: self.seed,
             cost: self.integrator == Integrator::Cost || self.aovs.contains(&Aov::Cost),
+            first_hits: !self.aovs.is_empty(),
             count: self.count,
         }
     }

@@ -1,9 +1,11 @@
 //! Lights as described. Emitting surfaces are lights too: see [`super::material::Material::emission`].
 
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::{DAffine2, DMat3, DVec3};
 
+use super::material::{TextureRef, Wrap};
 use super::texture::Texture;
 
 /// A light without a surface.
@@ -59,4 +61,51 @@ pub struct Environment {
     pub scale: DVec3,
     /// The picture's space to world space, a rotation.
     pub to_world: DMat3,
+}
+
+/// How the picture is looked up.
+const LOOKUP: TextureRef = TextureRef {
+    texture: 0,
+    uv_set: 0,
+    transform: DAffine2::IDENTITY,
+    wrap: [Wrap::Repeat, Wrap::Clamp],
+    nearest: false,
+};
+
+impl Environment {
+    /// Radiance from direction `dir` (where one looks; need not be unit), linear Rec.709, finite and not negative
+    /// whatever the picture holds.
+    pub fn radiance(&self, dir: DVec3) -> DVec3 {
+        self.radiance_at(self.place(dir))
+    }
+
+    /// The same at a place of the picture, 0..1 to the right and down.
+    pub fn radiance_at(&self, place: [f64; 2]) -> DVec3 {
+        let [r, g, b, _] = self.texture.sample(&LOOKUP, place);
+        let light = DVec3::new(r.into(), g.into(), b.into()) * self.scale;
+        if light.is_finite() { light.max(DVec3::ZERO) } else { DVec3::ZERO }
+    }
+
+    /// Where in the picture direction `dir` is.
+    pub fn place(&self, dir: DVec3) -> [f64; 2] {
+        let d = (self.to_world.transpose() * dir).normalize_or(DVec3::NEG_Z);
+        [0.5 + d.x.atan2(-d.z) / TAU, d.y.clamp(-1.0, 1.0).acos() / PI]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::texture::Texels;
+
+    #[test]
+    fn the_middle_is_ahead_and_x_to_the_right() {
+        let texels = Texels::Float(vec![[1.0; 4], [1.0; 4], [f32::NAN; 4], [1.0; 4]]);
+        let texture = Arc::new(Texture { name: String::new(), width: 2, height: 1, texels });
+        let e = Environment { texture, scale: DVec3::ONE, to_world: DMat3::IDENTITY };
+        assert_eq!(e.place(DVec3::NEG_Z), [0.5, 0.5]);
+        assert_eq!(e.place(DVec3::X * 3.0), [0.75, 0.5]);
+        assert_eq!(e.place(DVec3::Y)[1], 0.0);
+        assert_eq!((e.radiance_at([0.125, 0.5]), e.radiance_at([0.625, 0.5])), (DVec3::ONE, DVec3::ZERO));
+    }
 }

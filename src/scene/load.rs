@@ -9,8 +9,8 @@ use glam::DAffine3;
 use sha2::{Digest, Sha256};
 
 use super::description::{Description, Item, ItemKind};
-use super::kdl::meshes::{MeshFile, MeshFiles, add_mesh_materials};
-use super::mesh::Mesh;
+use super::kdl::meshes::{MeshFile, MeshFiles, add_looks, add_mesh_materials};
+use super::obj::looks::Looks;
 use super::reference::References;
 use super::{brlcad, builtin, gltf, kdl, obj, ply, stl, unpack};
 use crate::error::{Error, Result, nearest_name};
@@ -54,7 +54,9 @@ fn scene_file(path: &Path, options: &LoadOptions) -> Result<Description> {
     let file = File::open(path).map_err(|e| Error::io(path, e))?;
     file.take(kdl::MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, e))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let files = MeshFiles { folder: Some(folder), allow_outside: options.allow_outside, read: &read_mesh };
+    let references = References { folder: Some(folder), allow_outside: options.allow_outside };
+    let read = |path: &Path| read_mesh(path, &references);
+    let files = MeshFiles { folder: Some(folder), allow_outside: options.allow_outside, read: &read };
     kdl::parse(path, &stem(path), &bytes, &options.set, &files)
 }
 
@@ -87,32 +89,53 @@ fn refuse_set(path: &Path, options: &LoadOptions) -> Result<()> {
 /// A scene of one mesh.
 fn mesh_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
     refuse_set(path, options)?;
-    let MeshFile { mesh, digest } = read_mesh(path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let references = References { folder: Some(folder), allow_outside: options.allow_outside };
+    let MeshFile { mut mesh, digest, looks } = read_mesh(path, &references)?;
     let mut description = Description::new(stem(path));
+    let digest = match looks.digests.as_slice() {
+        [] => digest,
+        others => {
+            others.iter().fold(Sha256::new_with_prefix(digest), |all, one| all.chain_update(one)).finalize().into()
+        }
+    };
     description.hash = digest.iter().map(|b| format!("{b:02x}")).collect();
+    add_looks(&mut description, &mut mesh, looks, path, |_| false);
     description.meshes.push(Arc::new(mesh));
     description.groups[0].items.push(Item { transform: DAffine3::IDENTITY, material: None, kind: ItemKind::Mesh(0) });
     add_mesh_materials(&mut description);
     Ok(description)
 }
 
-/// Reads the mesh in `path`, told by its extension.
+/// Reads the mesh in `path`, told by its extension, and the material libraries that an OBJ file names; `references` is
+/// the scene's folder, out of which no library and no texture may be.
 ///
 /// # Errors
 /// Unknown extensions, unreadable or malformed files.
-pub fn read_mesh(path: &Path) -> Result<MeshFile> {
-    let parse: fn(&Path, &[u8]) -> Result<Mesh> = match unpack::inner_extension(path).unwrap_or_default().as_str() {
-        "obj" => |path, bytes| obj::parse(path, bytes).map(|file| file.mesh),
-        "ply" => ply::parse,
-        "stl" => stl::parse,
-        "gltf" | "glb" => {
-            let error = Error::whole(path, "expected a mesh file (.obj, .ply or .stl): glTF holds a whole scene");
-            return Err(error.with_help("open the glTF file by itself"));
-        }
-        _ => return Err(Error::whole(path, "expected a mesh file: .obj, .ply or .stl")),
-    };
+pub fn read_mesh(path: &Path, references: &References<'_>) -> Result<MeshFile> {
+    let inner = unpack::inner_extension(path).unwrap_or_default();
+    if !["obj", "ply", "stl"].contains(&inner.as_str()) {
+        return Err(match inner.as_str() {
+            "gltf" | "glb" => {
+                let error = Error::whole(path, "expected a mesh file (.obj, .ply or .stl): glTF holds a whole scene");
+                error.with_help("open the glTF file by itself")
+            }
+            _ => Error::whole(path, "expected a mesh file: .obj, .ply or .stl"),
+        });
+    }
     let bytes = unpack::read_file(path)?;
-    Ok(MeshFile { mesh: parse(path, &bytes)?, digest: Sha256::digest(&bytes).into() })
+    let digest = Sha256::digest(&bytes).into();
+    let (mesh, looks) = match inner.as_str() {
+        "obj" => {
+            let file = obj::parse(path, &bytes)?;
+            drop(bytes);
+            let looks = obj::looks::read(path, &file, references)?;
+            (file.mesh, looks)
+        }
+        "ply" => (ply::parse(path, &bytes)?, Looks::default()),
+        _ => (stl::parse(path, &bytes)?, Looks::default()),
+    };
+    Ok(MeshFile { mesh, digest, looks })
 }
 
 /// The known extension of `path`, lower case, without the packing's.

@@ -139,8 +139,7 @@ pub struct TextureRef {
     pub texture: TextureId,
     /// Set of texture coordinates of the mesh, 0 or 1.
     pub uv_set: u8,
-    /// Texture coordinates of the mesh (v up or down as the file has it) to those of the picture, whose first row
-    /// begins at v = 0.
+    /// Texture coordinates of the mesh to those of the picture, whose first row begins at v = 0.
     pub transform: DAffine2,
     /// What is beyond the edges, in u and v.
     pub wrap: [Wrap; 2],
@@ -158,6 +157,22 @@ pub enum Wrap {
     Mirror,
     /// Its outermost texels.
     Clamp,
+}
+
+impl Textures {
+    /// All uses of textures, to renumber them.
+    pub fn uses_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
+        let all = [
+            &mut self.base,
+            &mut self.opacity,
+            &mut self.emission,
+            &mut self.metallic_roughness,
+            &mut self.transmission,
+            &mut self.normal,
+            &mut self.occlusion,
+        ];
+        all.into_iter().flatten()
+    }
 }
 
 impl Default for Material {

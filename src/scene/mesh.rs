@@ -17,7 +17,8 @@ pub struct Mesh {
     pub groups: Vec<MeshGroup>,
     /// Shading normals, object space, need not be unit; zero or not finite where the file has none.
     pub normals: Attribute<[f32; 3]>,
-    /// Sets of texture coordinates.
+    /// Sets of texture coordinates: u to the right, v down, the picture's upper left corner at (0, 0). Importers turn
+    /// the v of formats where it points up.
     pub uvs: [Attribute<[f32; 2]>; 2],
     /// Tangents x, y, z with the bitangent's sign in w, as glTF 2.0 defines them (section 3.7.2.1).
     pub tangents: Attribute<[f32; 4]>,

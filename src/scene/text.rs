@@ -142,6 +142,18 @@ impl<'a> Words<'a> {
         rest[..length].trim_ascii()
     }
 
+    /// The words up to the end of the line with single spaces between: names may hold blanks and `#`.
+    pub fn rest_as_name(&mut self) -> String {
+        let mut joined = Vec::new();
+        while let Some(word) = self.next_in_line() {
+            if !joined.is_empty() {
+                joined.push(b' ');
+            }
+            joined.extend_from_slice(word.bytes);
+        }
+        name(&joined)
+    }
+
     /// An error at byte `at`.
     pub fn error(&self, at: usize, what: impl Into<String>) -> Error {
         error_at(self.file, self.bytes, at, what)

@@ -1,8 +1,7 @@
 //! Ambient occlusion.
 
-use glam::DVec3;
-
-use super::shader::{Sample, Shader, Workspace};
+use super::sample::Sample;
+use super::shader::{Shader, Workspace};
 use crate::camera::sampling::{PixelRandom, cosine_hemisphere};
 use crate::lanes::Real;
 
@@ -32,12 +31,7 @@ impl<S: Real> Shader<'_, S> {
                 work.batch.set(i, vertex.leave(), dir, zero, length);
             }
             work.rays.occlusion += work.batch.live_count() as u64;
-            self.occlude(work);
-            for (vertex, &occluded) in vertices.iter().zip(&work.occluded) {
-                if occluded == 0 {
-                    out[vertex.path as usize].radiance += DVec3::ONE;
-                }
-            }
+            self.occlude(work, false, |i, left| out[vertices[i].path as usize].radiance += left);
         }
         for vertex in &vertices {
             out[vertex.path as usize].radiance /= f64::from(rounds.max(1));

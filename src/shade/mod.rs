@@ -5,12 +5,16 @@
 //! in an order that depends on the path alone, so a pixel's value does not depend on what else is in its batch.
 
 mod ambient_occlusion;
+mod classic;
 mod integrator;
 mod lights;
+mod look;
 mod offset;
 mod path;
 mod rt;
+mod sample;
 mod shader;
+mod through;
 mod views;
 mod whitted;
 
@@ -19,4 +23,5 @@ pub use lights::headlight;
 pub use offset::{offset_origin, position_error};
 pub use path::{BounceStats, PathStats};
 pub use rt::unknown_shaders;
-pub use shader::{RayCounts, Sample, Settings, Shader, Workspace};
+pub use sample::{RayCounts, Sample};
+pub use shader::{Settings, Shader, Workspace};

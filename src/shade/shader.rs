@@ -1,15 +1,23 @@
 //! What integrators share: the first hits of a batch, compact batches of further rays, counts.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
+use super::classic::Classic;
 use super::integrator::Integrator;
+use super::look::Looks;
 use super::offset::{offset_origin, position_error};
 use super::path::{PathMemory, PathStats, Paths};
 use super::rt::Rt;
+use super::sample::{RayCounts, Sample};
+use super::through::{Again, Through, number};
 use crate::camera::Camera;
+use crate::camera::sobol::PixelPoints;
 use crate::lanes::Real;
-use crate::ray::{Counters, Hits, INVALID_ID, Rays};
-use crate::scene::description::{Description, Light, Material};
+use crate::ray::{Counters, Hits, Rays};
+use crate::scene::description::{Description, Light};
+use crate::scene::light::Environment;
 use crate::scene::world::World;
 use crate::trace::{Engine, Scratch};
 
@@ -31,94 +39,10 @@ pub struct Settings {
     pub seed: u64,
     /// Whether node visits of primary rays are counted (see [`Sample::nodes`]).
     pub cost: bool,
+    /// Whether more is wanted of first hits than radiance and coverage (only paths save the work).
+    pub first_hits: bool,
     /// Whether all engine calls count ([`Workspace::counters`]); counting kernels are slower.
     pub count: bool,
-}
-
-/// What one primary ray saw. For a miss: infinite distance, invalid ids, zeros, and what the integrator shows there.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
-    /// Radiance or the integrator's value, linear Rec.709.
-    pub radiance: DVec3,
-    /// Whether the radiance is opaque: 1 where something was hit or the integrator shows what lies behind, else 0.
-    pub alpha: f64,
-    /// Distance from the ray's origin to the hit, scene units.
-    pub distance: f64,
-    /// Hit point, world space.
-    pub position: DVec3,
-    /// Unit geometric normal, world space, turned towards the viewer.
-    pub normal: DVec3,
-    /// Unit shading normal on the same side.
-    pub shading_normal: DVec3,
-    /// Diffuse reflectance; the base colour of other materials.
-    pub albedo: DVec3,
-    /// Part of the radiance that came from a light without detours: seen itself, or scattered once.
-    pub direct: DVec3,
-    /// Material number.
-    pub material: u32,
-    /// Of a pixel: variance of the mean brightness, estimated from its samples.
-    pub square: f64,
-    /// Of a pixel: number of samples.
-    pub samples: u32,
-    /// Instance number.
-    pub inst: u32,
-    /// Primitive number.
-    pub prim: u32,
-    /// Node visits per ray, if counted: packets share visits, so this is the number of visits that the engine made
-    /// for the 4 x 4 block of rays around this one, divided by the block's live rays. Depends on the engine.
-    pub nodes: f64,
-}
-
-impl Sample {
-    /// A ray that hit nothing in a black world.
-    pub const MISS: Self = Self {
-        radiance: DVec3::ZERO,
-        alpha: 0.0,
-        distance: f64::INFINITY,
-        position: DVec3::ZERO,
-        normal: DVec3::ZERO,
-        shading_normal: DVec3::ZERO,
-        albedo: DVec3::ZERO,
-        direct: DVec3::ZERO,
-        material: INVALID_ID,
-        square: 0.0,
-        samples: 0,
-        inst: INVALID_ID,
-        prim: INVALID_ID,
-        nodes: 0.0,
-    };
-}
-
-/// Live rays traced, by kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RayCounts {
-    /// From the camera.
-    pub primary: u64,
-    /// Towards lights (any-hit).
-    pub shadow: u64,
-    /// Ambient occlusion (any-hit).
-    pub occlusion: u64,
-    /// Mirror reflections.
-    pub mirror: u64,
-    /// Scattered along paths.
-    pub scattered: u64,
-}
-
-impl RayCounts {
-    /// All rays.
-    pub fn total(&self) -> u64 {
-        self.primary + self.shadow + self.occlusion + self.mirror + self.scattered
-    }
-}
-
-impl std::ops::AddAssign for RayCounts {
-    fn add_assign(&mut self, o: Self) {
-        self.primary += o.primary;
-        self.shadow += o.shadow;
-        self.occlusion += o.occlusion;
-        self.mirror += o.mirror;
-        self.scattered += o.scattered;
-    }
 }
 
 /// A point on a surface that a path reached.
@@ -136,6 +60,12 @@ pub(super) struct Vertex {
     /// Direction the ray came along, not unit.
     pub dir: DVec3,
     pub material: u32,
+    /// What the point does with light from the direction it is seen along.
+    pub classic: Classic,
+    /// Base colour.
+    pub albedo: DVec3,
+    /// Share of ambient light that arrives.
+    pub ambient: f64,
     /// What of this point's radiance reaches the eye.
     pub throughput: DVec3,
 }
@@ -152,6 +82,7 @@ pub struct Workspace<S> {
     pub(super) vertices: Vec<Vertex>,
     pub(super) batch: Rays<S>,
     pub(super) occluded: Vec<u8>,
+    again: Again<S>,
     pub(super) paths: PathMemory<S>,
     block: Rays<S>,
     block_hits: Hits<S>,
@@ -167,6 +98,7 @@ impl<S: Real> Default for Workspace<S> {
             vertices: Vec::new(),
             batch: Rays::new(0),
             occluded: Vec::new(),
+            again: Again::default(),
             paths: PathMemory::default(),
             block: Rays::new(0),
             block_hits: Hits::new(0),
@@ -188,13 +120,13 @@ pub struct Shader<'a, S: Real> {
     pub(super) lights: Vec<Light>,
     /// Whether lights cast shadows: those of a scene do, the default light does not.
     pub(super) shadows: bool,
-    pub(super) background: DVec3,
+    background: DVec3,
+    environment: Option<&'a Environment>,
     pub(super) ambient: DVec3,
     pub(super) settings: Settings,
     /// Length of occlusion rays, scene units.
     pub(super) ao_length: f64,
-    materials: &'a [Material],
-    default_material: Material,
+    pub(super) looks: Arc<Looks<'a>>,
     rt: Option<Rt>,
     paths: Option<Paths<'a, S>>,
 }
@@ -211,8 +143,9 @@ impl<'a, S: Real> Shader<'a, S> {
     ) -> Self {
         let diagonal = world.bounds().map_or(f64::INFINITY, |(lo, hi)| (hi - lo).length());
         let ao_length = settings.ao_radius * diagonal;
+        let looks = Arc::new(Looks::new(description));
         let paths = (settings.integrator == Integrator::Path)
-            .then(|| Paths::new(world, description, engine, default_light, settings.depth, settings.seed));
+            .then(|| Paths::new(world, description, looks.clone(), engine, default_light, &settings));
         let lights = if description.lights.is_empty() { vec![default_light] } else { description.lights.clone() };
         Self {
             world,
@@ -220,11 +153,11 @@ impl<'a, S: Real> Shader<'a, S> {
             lights,
             shadows: !description.lights.is_empty(),
             background: description.background,
+            environment: description.environment.as_ref(),
+            looks,
             ambient: description.ambient,
             settings,
             ao_length: if ao_length.is_nan() { f64::INFINITY } else { ao_length },
-            materials: &description.materials,
-            default_material: Material::default(),
             rt: None,
             paths,
         }
@@ -259,7 +192,7 @@ impl<'a, S: Real> Shader<'a, S> {
         if self.settings.cost {
             self.trace_blocks(rays, work, out);
         } else {
-            self.intersect(rays, work);
+            self.intersect(rays, work, |i, layer| self.number(pixels[i], sample, 0, layer));
         }
         work.vertices.clear();
         for i in 0..rays.len() {
@@ -275,12 +208,12 @@ impl<'a, S: Real> Shader<'a, S> {
             seen.normal = vertex.normal;
             seen.shading_normal = vertex.shading_normal;
             seen.material = vertex.material;
-            seen.albedo = self.material(vertex.material).diffuse;
+            seen.albedo = vertex.albedo;
             (seen.inst, seen.prim) = (work.hits.inst[i], work.hits.prim[i]);
         }
         match self.settings.integrator {
             // Without regions to look at, `rt`'s model has nothing to say.
-            Integrator::Whitted | Integrator::Rt | Integrator::Path => self.whitted(rays, work, out),
+            Integrator::Whitted | Integrator::Rt | Integrator::Path => self.whitted(rays, pixels, sample, work, out),
             Integrator::Ao => self.ambient_occlusion(pixels, sample, work, out),
             Integrator::Normals => super::views::normals(out),
             Integrator::Depth => super::views::depth(out),
@@ -288,16 +221,41 @@ impl<'a, S: Real> Shader<'a, S> {
         }
     }
 
-    /// Closest hits of `rays` into `work.hits`.
-    pub(super) fn intersect(&self, rays: &Rays<S>, work: &mut Workspace<S>) {
+    /// Closest hits of `rays` into `work.hits`. Where surfaces let rays pass by chance, `number` decides for ray `i` at
+    /// its layer `k`.
+    pub(super) fn intersect(&self, rays: &Rays<S>, work: &mut Workspace<S>, number: impl Fn(usize, u32) -> f64) {
+        let counters = self.settings.count.then_some(&mut work.counters);
+        let (hits, scratch, again) = (&mut work.hits, &mut work.scratch, &mut work.again);
+        self.through().closest(rays, hits, scratch, again, counters, number);
+    }
+
+    /// The same where every surface counts.
+    pub(super) fn intersect_all(&self, rays: &Rays<S>, work: &mut Workspace<S>) {
         let counters = self.settings.count.then_some(&mut work.counters);
         self.engine.intersect(self.world, rays, &mut work.hits, &mut work.scratch, counters);
     }
 
-    /// Whether each ray of `work.batch` is occluded, into `work.occluded`.
-    pub(super) fn occlude(&self, work: &mut Workspace<S>) {
+    /// Calls `lit` with the number of each ray of `work.batch` that is not occluded, and the share of its light that
+    /// arrives; `glass` lets light pass through it.
+    pub(super) fn occlude(&self, work: &mut Workspace<S>, glass: bool, mut lit: impl FnMut(usize, DVec3)) {
         let counters = self.settings.count.then_some(&mut work.counters);
-        self.engine.occluded(self.world, &work.batch, &mut work.occluded, &mut work.scratch, counters);
+        let (hits, occluded, scratch) = (&mut work.hits, &mut work.occluded, &mut work.scratch);
+        let left = self.through().shadows(&work.batch, hits, occluded, scratch, &mut work.again, glass, counters);
+        left.iter().enumerate().filter(|(_, left)| **left != DVec3::ZERO).for_each(|(i, left)| lit(i, *left));
+    }
+
+    fn through(&self) -> Through<'_, S> {
+        Through { world: self.world, engine: self.engine, looks: &self.looks }
+    }
+
+    /// A number in [0, 1) of a pixel's sample and level, by name.
+    pub(super) fn number(&self, (x, y): (u32, u32), sample: u32, level: u32, name: u32) -> f64 {
+        number(PixelPoints::new(x, y, self.settings.seed), sample, level, name)
+    }
+
+    /// Radiance of a ray that leaves the scene along `dir`.
+    pub(super) fn beyond(&self, dir: DVec3) -> DVec3 {
+        self.environment.map_or(self.background, |environment| environment.radiance(dir))
     }
 
     /// As [`Self::intersect`], 16 rays at a time with counting kernels, which gives each block of 4 x 4 pixels its
@@ -334,16 +292,15 @@ impl<'a, S: Real> Shader<'a, S> {
         let facing = if surface.ng.dot(dir) > 0.0 { -surface.ng } else { surface.ng };
         // A triangle too thin for a normal is seen face on.
         let normal = if facing.is_finite() { facing } else { -dir.normalize_or_zero() };
-        let shading_normal = if surface.ng.dot(dir) > 0.0 { -surface.ns } else { surface.ns };
+        let ns = self.looks.bumped(surface.material, &surface);
+        let shading_normal = if surface.ng.dot(dir) > 0.0 { -ns } else { ns };
         let shading_normal = if surface.ng == normal || surface.ng == -normal { shading_normal } else { normal };
         let error = position_error::<S>(org, dir, t, surface.position, surface.magnitude);
         let (position, material) = (surface.position, surface.material);
-        Vertex { path, position, error, normal, shading_normal, dir, material, throughput }
-    }
-
-    /// Material number `id` of the description.
-    pub(super) fn material(&self, id: u32) -> &Material {
-        self.materials.get(id as usize).unwrap_or(&self.default_material)
+        let classic = Classic::of(&self.looks, &surface, dir);
+        let albedo = self.looks.look(self.looks.resolve(material, 1.0), &surface, surface.ng.dot(dir) <= 0.0).base;
+        let ambient = self.looks.ambient(material, &surface);
+        Vertex { path, position, error, normal, shading_normal, dir, material, classic, albedo, ambient, throughput }
     }
 }
 
@@ -351,5 +308,10 @@ impl Vertex {
     /// Origin of a ray that leaves the point to the side of its normal.
     pub fn leave<S: Real>(&self) -> [S; 3] {
         offset_origin(self.position, self.error, self.normal)
+    }
+
+    /// Origin of a ray that enters the surface.
+    pub fn enter<S: Real>(&self) -> [S; 3] {
+        offset_origin(self.position, self.error, -self.normal)
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::shader::Sample;
+use super::sample::Sample;
 
 /// Heat of a cost, from cold to hot; linear Rec.709, brighter is dearer.
 const HEAT: [DVec3; 5] = [

@@ -4,31 +4,48 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use super::classic::refract;
 use super::lights::{irradiance, shadow_segment};
-use super::shader::{Sample, Shader, Vertex, Workspace};
+use super::sample::Sample;
+use super::shader::{Shader, Vertex, Workspace};
 use crate::lanes::Real;
 use crate::ray::Rays;
 use crate::scene::description::Light;
 
+/// Branches whose light would be weakened below this are not followed.
+const CUT_OFF: f64 = 1.0 / 1024.0;
+
+/// A ray that leaves a vertex: org, direction, what of its radiance reaches the eye.
+type Branch<'v, S> = (&'v Vertex, [S; 3], DVec3, DVec3);
+
 impl<S: Real> Shader<'_, S> {
-    /// Radiance = emission + diffuse ambient + sum over lights of diffuse / pi * irradiance + mirror * radiance
-    /// from the mirrored direction, `depth` mirrors deep; what leaves the scene sees the background.
+    /// Radiance = emission + diffuse ambient + sum over lights of diffuse / pi * irradiance + mirror * radiance from
+    /// the mirrored direction + through * radiance from the refracted direction, `depth` levels deep; what leaves the
+    /// scene sees the background. Light passes glass straight on its way from a light.
     ///
     /// `work.vertices` are the hits of `rays`. A sample's terms are added level by level and light by light.
-    pub(super) fn whitted(&self, rays: &Rays<S>, work: &mut Workspace<S>, out: &mut [Sample]) {
+    pub(super) fn whitted(
+        &self,
+        rays: &Rays<S>,
+        pixels: &[(u32, u32)],
+        sample: u32,
+        work: &mut Workspace<S>,
+        out: &mut [Sample],
+    ) {
         for i in 0..rays.len() {
             if !work.hits.is_hit(i) && rays.is_live(i) {
-                out[i].radiance = self.background;
+                let behind = self.beyond(DVec3::from(rays.dir(i).map(S::to_f64)));
+                out[i].radiance = behind;
                 // A background that shines is part of the picture; a black one stays transparent.
-                out[i].alpha = f64::from(u8::from(self.background != DVec3::ZERO));
+                out[i].alpha = f64::from(u8::from(behind != DVec3::ZERO));
             }
         }
         let mut vertices = std::mem::take(&mut work.vertices);
         let mut next = Vec::new();
         for level in 0..=self.settings.depth {
             for vertex in &vertices {
-                let material = self.material(vertex.material);
-                let unlit = material.emission + material.diffuse * self.ambient;
+                let point = &vertex.classic;
+                let unlit = point.emission + point.diffuse * self.ambient * vertex.ambient;
                 out[vertex.path as usize].radiance += vertex.throughput * unlit;
             }
             for light in &self.lights {
@@ -37,7 +54,9 @@ impl<S: Real> Shader<'_, S> {
             if level == self.settings.depth || vertices.is_empty() {
                 break;
             }
-            self.mirror(&vertices, &mut next, work, out);
+            next.clear();
+            let branches = self.branches(&vertices);
+            self.follow(&branches, pixels, (sample, level + 1), &mut next, work, out);
             std::mem::swap(&mut vertices, &mut next);
         }
         work.vertices = vertices;
@@ -48,8 +67,8 @@ impl<S: Real> Shader<'_, S> {
         let lit: Vec<(&Vertex, DVec3)> = vertices
             .iter()
             .filter_map(|vertex| {
-                let arriving = irradiance(light, vertex.position, vertex.normal)?;
-                let value = vertex.throughput * self.material(vertex.material).diffuse / PI * arriving;
+                let arriving = irradiance(light, vertex.position, vertex.shading_normal)?;
+                let value = vertex.throughput * vertex.classic.diffuse / PI * arriving;
                 (value != DVec3::ZERO).then_some((vertex, value))
             })
             .collect();
@@ -67,38 +86,58 @@ impl<S: Real> Shader<'_, S> {
             work.batch.set(i, org, dir.to_array().map(S::from_f64), S::from_f64(0.0), S::from_f64(t_max));
         }
         work.rays.shadow += work.batch.live_count() as u64;
-        self.occlude(work);
-        for ((vertex, value), &occluded) in lit.iter().zip(&work.occluded) {
-            if occluded == 0 {
-                out[vertex.path as usize].radiance += *value;
-            }
-        }
+        self.occlude(work, true, |i, left| {
+            let (vertex, value) = lit[i];
+            out[vertex.path as usize].radiance += value * left;
+        });
     }
 
-    /// Follows the mirror part of each vertex: its hits into `next`, the background where there is none.
-    fn mirror(&self, vertices: &[Vertex], next: &mut Vec<Vertex>, work: &mut Workspace<S>, out: &mut [Sample]) {
-        next.clear();
-        let seen: Vec<(&Vertex, DVec3)> = vertices
-            .iter()
-            .map(|vertex| (vertex, vertex.throughput * self.material(vertex.material).mirror))
-            .filter(|(_, throughput)| *throughput != DVec3::ZERO)
-            .collect();
-        if seen.is_empty() {
+    /// The mirrored and refracted rays of `vertices` that carry enough light, all mirrored ones first.
+    fn branches<'v>(&self, vertices: &'v [Vertex]) -> Vec<Branch<'v, S>> {
+        let bright = |light: DVec3| light.max_element() >= CUT_OFF;
+        let mirrored = vertices.iter().filter_map(|vertex| {
+            let throughput = vertex.throughput * vertex.classic.mirror;
+            let dir = reflect(vertex.dir, vertex.shading_normal);
+            // Where the shading normal would send it into the surface, the surface's own normal decides.
+            let dir = if dir.dot(vertex.normal) > 0.0 { dir } else { reflect(vertex.dir, vertex.normal) };
+            bright(throughput).then(|| (vertex, vertex.leave(), dir, throughput))
+        });
+        let refracted = vertices.iter().filter_map(|vertex| {
+            let throughput = vertex.throughput * vertex.classic.through;
+            let dir = refract(vertex.dir, vertex.normal, vertex.classic.eta)?;
+            bright(throughput).then(|| (vertex, vertex.enter(), dir, throughput))
+        });
+        mirrored.chain(refracted).collect()
+    }
+
+    /// Follows `branches`: their hits into `next`, the background where there is none.
+    fn follow(
+        &self,
+        branches: &[Branch<'_, S>],
+        pixels: &[(u32, u32)],
+        (sample, level): (u32, u32),
+        next: &mut Vec<Vertex>,
+        work: &mut Workspace<S>,
+        out: &mut [Sample],
+    ) {
+        if branches.is_empty() {
             return;
         }
         let mut batch = std::mem::take(&mut work.batch);
-        batch.reset(seen.len());
-        for (i, (vertex, _)) in seen.iter().enumerate() {
-            let dir = reflect(vertex.dir, vertex.normal).to_array().map(S::from_f64);
-            batch.set(i, vertex.leave(), dir, S::from_f64(0.0), S::from_f64(f64::INFINITY));
+        batch.reset(branches.len());
+        for (i, &(vertex, org, dir, _)) in branches.iter().enumerate() {
+            batch.set(i, org, dir.to_array().map(S::from_f64), S::from_f64(0.0), S::from_f64(f64::INFINITY));
+            // Of a vertex's two branches the mirrored one counts as such.
+            let is_mirrored = dir.dot(vertex.normal) > 0.0;
+            *(if is_mirrored { &mut work.rays.mirror } else { &mut work.rays.refracted }) +=
+                u64::from(batch.is_live(i));
         }
-        work.rays.mirror += batch.live_count() as u64;
-        self.intersect(&batch, work);
-        for (i, &(vertex, throughput)) in seen.iter().enumerate() {
+        self.intersect(&batch, work, |i, layer| self.number(pixels[branches[i].0.path as usize], sample, level, layer));
+        for (i, &(vertex, _, dir, throughput)) in branches.iter().enumerate() {
             if work.hits.is_hit(i) {
                 next.push(self.vertex(&batch, &work.hits, i, vertex.path, throughput));
             } else {
-                out[vertex.path as usize].radiance += throughput * self.background;
+                out[vertex.path as usize].radiance += throughput * self.beyond(dir);
             }
         }
         work.batch = batch;

@@ -40,6 +40,7 @@ struct Rays {
     shadow: u64,
     occlusion: u64,
     mirror: u64,
+    refracted: u64,
     scattered: u64,
     total: u64,
 }
@@ -80,6 +81,7 @@ pub(super) fn report<'a>(
             shadow: rays.shadow,
             occlusion: rays.occlusion,
             mirror: rays.mirror,
+            refracted: rays.refracted,
             scattered: rays.scattered,
             total: rays.total(),
         },
@@ -104,8 +106,8 @@ pub(super) fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput
         rays.total, report.seconds, report.engine, report.mrays_per_s
     ));
     args.output.detail(&format!(
-        "rays: {} primary, {} shadow, {} occlusion, {} mirror, {} scattered; build {:.3} s",
-        rays.primary, rays.shadow, rays.occlusion, rays.mirror, rays.scattered, report.build_seconds
+        "rays: {} primary, {} shadow, {} occlusion, {} mirror, {} refracted, {} scattered; build {:.3} s",
+        rays.primary, rays.shadow, rays.occlusion, rays.mirror, rays.refracted, rays.scattered, report.build_seconds
     ));
     let c = &output.counters;
     args.output.detail(&format!(

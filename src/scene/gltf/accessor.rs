@@ -97,6 +97,14 @@ pub const POSITIONS: Expected = Expected {
     width: 3,
     components: &[Component::F32, Component::I8, Component::U8, Component::I16, Component::U16],
 };
+/// Normals.
+pub const NORMALS: Expected =
+    Expected { kind: "VEC3", width: 3, components: &[Component::F32, Component::I8, Component::I16] };
+/// Tangents with the bitangent's sign.
+pub const TANGENTS: Expected =
+    Expected { kind: "VEC4", width: 4, components: &[Component::F32, Component::I8, Component::I16] };
+/// Texture coordinates, those of KHR_mesh_quantization among them.
+pub const COORDINATES: Expected = Expected { kind: "VEC2", width: 2, ..POSITIONS };
 /// Translations and scales of instances.
 pub const VECTORS: Expected = Expected { kind: "VEC3", width: 3, components: &[Component::F32] };
 /// Rotations of instances.
@@ -235,8 +243,11 @@ impl Document<'_> {
         Ok(substitutes)
     }
 
-    /// `count` elements of `size` bytes, from byte `offset` of the buffer view `index`.
-    fn elements(&self, index: u32, offset: u64, count: usize, size: usize, path: &str) -> Result<Elements<'_>> {
+    /// The bytes of the buffer view `index`, which `path` refers to.
+    ///
+    /// # Errors
+    /// An index that names nothing, a range beyond the buffer, a buffer without bytes.
+    pub(super) fn bytes(&self, index: u32, path: impl Display) -> Result<&[u8]> {
         let view = self.get(&self.root.buffer_views, "bufferViews", index, format_args!("{path}.bufferView"))?;
         let view_path = format_args!("bufferViews[{index}]");
         self.get(&self.root.buffers, "buffers", view.buffer, format_args!("{view_path}.buffer"))?;
@@ -248,6 +259,14 @@ impl Document<'_> {
             let what = format!("expected {long} bytes from byte {at} on, but the buffer has {}", bytes.len());
             return Err(self.error(view_path, what));
         };
+        Ok(whole)
+    }
+
+    /// `count` elements of `size` bytes, from byte `offset` of the buffer view `index`.
+    fn elements(&self, index: u32, offset: u64, count: usize, size: usize, path: &str) -> Result<Elements<'_>> {
+        let whole = self.bytes(index, path)?;
+        let view = &self.root.buffer_views[index as usize];
+        let view_path = format_args!("bufferViews[{index}]");
         let stride = view.byte_stride.map_or(size, |stride| stride as usize);
         if stride < size {
             let what = format!("byteStride {stride} is less than the {size} bytes of an element of {path}");

@@ -33,6 +33,15 @@ enum Content<'a> {
     File(Rc<Vec<u8>>),
 }
 
+/// What a URI leads to.
+#[derive(Debug)]
+pub enum Target {
+    /// Bytes inside the URI.
+    Inline(Vec<u8>),
+    /// A file.
+    File(PathBuf),
+}
+
 impl<'a> Buffers<'a> {
     /// The buffers of `list`, nothing read yet; `bin` is the binary chunk.
     pub fn new(list: &'a [Buffer], bin: Option<&'a [u8]>, references: References<'a>) -> Self {
@@ -73,18 +82,29 @@ impl<'a> Buffers<'a> {
         self.files.borrow().values().map(|bytes| Sha256::digest(bytes.as_slice()).into()).collect()
     }
 
+    /// What `uri` leads to: the content of a `data:` URI, or a file of the scene's folder.
+    ///
+    /// # Errors
+    /// A URI that is refused or malformed, a file that does not exist.
+    pub fn target(&self, uri: &str) -> Result<Target, String> {
+        if let Some(data) = strip_scheme(uri, "data:") {
+            return inline(data).map(Target::Inline);
+        }
+        if has_scheme(uri) {
+            return Err(format!("expected a relative path or a data: URI, found {}", text::shown(uri.as_bytes())));
+        }
+        Ok(Target::File(self.references.resolve(&percent_decoded(uri)?)?))
+    }
+
     fn load(&self, index: usize) -> Result<Content<'a>, String> {
         let Some(uri) = self.list[index].uri.as_deref() else {
             let first = if index == 0 { self.bin } else { None };
             return first.map(Content::Chunk).ok_or_else(|| "expected a `uri`, or a binary chunk that holds it".into());
         };
-        if let Some(data) = strip_scheme(uri, "data:") {
-            return inline(data).map(Content::Inline);
-        }
-        if has_scheme(uri) {
-            return Err(format!("expected a relative path or a data: URI, found {}", text::shown(uri.as_bytes())));
-        }
-        let path = self.references.resolve(&percent_decoded(uri)?)?;
+        let path = match self.target(uri)? {
+            Target::Inline(bytes) => return Ok(Content::Inline(bytes)),
+            Target::File(path) => path,
+        };
         if let Some(known) = self.files.borrow().get(&path) {
             return Ok(Content::File(known.clone()));
         }

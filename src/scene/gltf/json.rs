@@ -8,6 +8,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use super::container::Parts;
+use super::json_looks::{Image, Material, NodeLight, RootExtensions, Sampler, Texture};
 use crate::error::{Error, Result};
 use crate::scene::text;
 
@@ -41,9 +42,16 @@ pub struct Root {
     #[serde(default)]
     pub materials: Vec<Material>,
     #[serde(default)]
+    pub textures: Vec<Texture>,
+    #[serde(default)]
+    pub samplers: Vec<Sampler>,
+    #[serde(default)]
+    pub images: Vec<Image>,
+    #[serde(default)]
     pub skins: Vec<IgnoredAny>,
     #[serde(default)]
     pub animations: Vec<IgnoredAny>,
+    pub extensions: Option<Box<RootExtensions>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -75,6 +83,8 @@ pub struct Node {
 pub struct NodeExtensions {
     #[serde(rename = "EXT_mesh_gpu_instancing")]
     pub instancing: Option<Instancing>,
+    #[serde(rename = "KHR_lights_punctual")]
+    pub light: Option<NodeLight>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -107,10 +117,14 @@ pub struct Primitive {
     pub extensions: Option<PrimitiveExtensions>,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub struct Attributes {
     pub position: Option<u32>,
+    pub normal: Option<u32>,
+    pub tangent: Option<u32>,
+    pub texcoord_0: Option<u32>,
+    pub texcoord_1: Option<u32>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -190,20 +204,6 @@ pub struct Perspective {
 #[derive(Debug, Deserialize)]
 pub struct Orthographic {
     pub ymag: f64,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct Material {
-    pub name: Option<Box<str>>,
-    pub pbr_metallic_roughness: Option<Box<MetallicRoughness>>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct MetallicRoughness {
-    pub base_color_factor: Option<[f64; 4]>,
-    pub base_color_texture: Option<IgnoredAny>,
 }
 
 /// What tells a document of version 1 from this one: there, lists are maps and the rest cannot be read at all.

@@ -1,32 +1,14 @@
-//! Cameras, and the base colours of materials.
+//! Cameras and lights, as their nodes place them.
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use glam::{DAffine3, DVec3};
 
 use super::Document;
-use super::json::Root;
+use super::json_looks::Light as Written;
 use crate::error::Result;
-use crate::scene::description::{CameraDescription, Description, Material, Projection};
+use crate::scene::description::{CameraDescription, Light, Projection};
 use crate::scene::text;
-
-/// Diffuse reflectance behind a base colour of 1: textures are not read, and a scene of pure white has no shading.
-const WHITE: f64 = 0.8;
-
-/// Adds the document's materials: number `i` becomes `i + 1`, after the default material.
-pub fn add_materials(root: &Root, description: &mut Description) {
-    description.materials.reserve_exact(root.materials.len());
-    let mut textured = 0;
-    for (i, material) in root.materials.iter().enumerate() {
-        let pbr = material.pbr_metallic_roughness.as_deref();
-        textured += usize::from(pbr.is_some_and(|pbr| pbr.base_color_texture.is_some()));
-        let factor = pbr.and_then(|pbr| pbr.base_color_factor).unwrap_or([1.0; 4]);
-        let diffuse = DVec3::new(factor[0], factor[1], factor[2]).clamp(DVec3::ZERO, DVec3::ONE) * WHITE;
-        let name = material.name.as_deref().map_or_else(|| format!("material {i}"), |n| text::name(n.as_bytes()));
-        description.materials.push(Material { name, diffuse, ..Material::default() });
-    }
-    if textured > 0 {
-        description.warnings.push(format!("textures are not read: {textured} materials have their base colour only"));
-    }
-}
 
 /// Camera `index` as node `node` places it; `None` for a kind that an extension defines.
 ///
@@ -66,4 +48,43 @@ pub fn camera(
     let eye = to_world.translation;
     let name = name.unwrap_or_else(|| format!("camera {index}"));
     Ok(Some(CameraDescription { name, eye, look_at: eye + forward, up, projection }))
+}
+
+/// Light `index` of KHR_lights_punctual as node `node` places it: candela are radiant intensity here, lux irradiance,
+/// both without conversion. Its range is not read: light falls with the square of the distance, however far.
+///
+/// # Errors
+/// An index that names nothing, an unknown kind, negative numbers, cones that do not open or open beyond a half-space.
+pub fn light(document: &Document<'_>, index: u32, node: u32, to_world: &DAffine3) -> Result<Light> {
+    let all: &[Written] = document.root.extensions.as_ref().and_then(|e| e.lights.as_ref()).map_or(&[], |l| &l.lights);
+    let written = document.get(all, "lights", index, format_args!("nodes[{node}].extensions.KHR_lights_punctual"))?;
+    let path = format!("extensions.KHR_lights_punctual.lights[{index}]");
+    let strength = DVec3::from_array(written.color.unwrap_or([1.0; 3])) * written.intensity.unwrap_or(1.0);
+    if strength.min_element() < 0.0 || !strength.is_finite() {
+        return Err(document.error(path, format!("expected a color and an intensity of 0 or more, found {strength}")));
+    }
+    // A light shines along -z; scales of its node do not count.
+    let direction = to_world.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+    let position = to_world.translation;
+    match &*written.kind {
+        "point" => Ok(Light::Point { position, intensity: strength }),
+        "directional" => Ok(Light::Directional { direction, irradiance: strength }),
+        "spot" => {
+            let cone = written.spot.as_deref();
+            let inner = cone.and_then(|c| c.inner_cone_angle).unwrap_or(0.0);
+            let outer = cone.and_then(|c| c.outer_cone_angle).unwrap_or(FRAC_PI_4);
+            // Exporters round a right angle to f32.
+            if !(inner >= 0.0 && inner < outer && outer <= FRAC_PI_2 + 1e-6) {
+                let what =
+                    format!("expected 0 <= innerConeAngle < outerConeAngle <= pi / 2, found {inner} and {outer}");
+                return Err(document.error(format_args!("{path}.spot"), what));
+            }
+            Ok(Light::Spot { position, direction, intensity: strength, inner, outer })
+        }
+        other => {
+            let found = text::shown(other.as_bytes());
+            Err(document
+                .error(format_args!("{path}.type"), format!("expected point, spot or directional, found {found}")))
+        }
+    }
 }

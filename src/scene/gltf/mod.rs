@@ -1,18 +1,21 @@
-//! glTF 2.0, text and binary: geometry, nodes as instances, cameras, and the base colours of materials.
+//! glTF 2.0, text and binary: geometry, nodes as instances, cameras, lights, materials and their textures.
 //!
 //! Source: Khronos Group, "glTF 2.0 Specification", revision 2.0.1, 2021, and the extensions that are named below.
 //! serde_json reads the JSON into structs of our own, because the `gltf` crate slices buffers at positions that it
 //! does not check, and panics where a document lies.
 //!
-//! * `container` splits a binary file, `json` reads the document, `buffers` finds the bytes, `accessor` views them as
-//!   numbers, `primitive` makes meshes, `tree` checks the nodes, `walk` places them, `look` reads cameras and colours.
+//! * `container` splits a binary file, `json` and `json_looks` read the document, `buffers` finds the bytes, `accessor`
+//!   views them as numbers, `primitive` makes meshes, `tree` checks the nodes, `walk` places them, `look` reads cameras
+//!   and lights, `materials` and `textures` what surfaces look like.
 //! * Each primitive is stored once; a mesh is a group of its primitives, which the nodes that use it place, as do the
 //!   instances of EXT_mesh_gpu_instancing. Nodes with children are groups.
-//! * Read besides: KHR_mesh_quantization. Lights, textures, skins and animations are not read; a warning says so.
+//! * Read besides: KHR_mesh_quantization, KHR_lights_punctual, KHR_texture_transform, and of KHR_materials_*:
+//!   emissive_strength, ior, transmission and unlit (as emission). Skins and animations are not read; a warning says so.
 //!
 //! Memory and time: decoded data (vertices, triangles, instances) stay below [`DECODED_PER_BYTE`] bytes per byte of
 //! the document and of the files it refers to, however often the same bytes are named; counts are compared with
-//! buffers before anything is allocated. The JSON itself takes less than 64 bytes per byte.
+//! buffers before anything is allocated. The JSON itself takes less than 64 bytes per byte. Pictures have the bounds of
+//! [`super::pictures`].
 
 mod accessor;
 mod budget;
@@ -21,8 +24,11 @@ mod container;
 mod extensions;
 mod instances;
 mod json;
+mod json_looks;
 mod look;
+mod materials;
 mod primitive;
+mod textures;
 mod tree;
 mod walk;
 
@@ -61,10 +67,10 @@ pub fn parse(file: &Path, name: &str, bytes: &[u8], references: &References<'_>)
         buffers: Buffers::new(&root.buffers, parts.bin, *references),
         budget: Budget::new(bytes.len() as u64),
     };
-    look::add_materials(&root, &mut description);
+    let pictures = materials::add(&document, &mut description)?;
     let roots = tree::roots(&document)?;
     walk::place(&document, &roots, &mut description)?;
-    description.hash = hash(bytes, &document.buffers.digests());
+    description.hash = hash(bytes, &[document.buffers.digests(), pictures].concat());
     Ok(description)
 }
 
@@ -99,7 +105,7 @@ impl Document<'_> {
     }
 }
 
-/// SHA-256, hex, over the document and the files of its buffers.
+/// SHA-256, hex, over the document, the files of its buffers and its pictures.
 fn hash(bytes: &[u8], files: &[[u8; 32]]) -> String {
     let mut digest: [u8; 32] = Sha256::digest(bytes).into();
     if !files.is_empty() {

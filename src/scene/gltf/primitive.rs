@@ -7,11 +7,11 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::Document;
-use super::accessor::{INDICES, POSITIONS, View};
-use super::json::Primitive;
+use super::accessor::{COORDINATES, Expected, INDICES, NORMALS, POSITIONS, TANGENTS, View};
+use super::json::{Attributes, Primitive};
 use crate::error::Result;
 use crate::scene::description::{Description, Item, ItemKind, MaterialId};
-use crate::scene::mesh::Mesh;
+use crate::scene::mesh::{Attribute, Mesh};
 
 /// How indices form triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -40,8 +40,8 @@ impl Mode {
     }
 }
 
-/// What makes primitives the same mesh: accessors of positions and of indices, mode.
-type Key = (u32, Option<u32>, Mode);
+/// What makes primitives the same mesh: accessors of attributes and of indices, mode.
+type Key = (Attributes, Option<u32>, Mode);
 
 /// The meshes made so far and what was passed over.
 #[derive(Debug)]
@@ -106,7 +106,12 @@ impl Primitives {
             Some(other) => return Err(document.error(path, format!("expected a mode from 0 to 6, found {other}"))),
         };
         let Some(positions) = primitive.attributes.position else { return Ok(None) };
-        let key = (positions, primitive.indices, mode);
+        let mut attributes = primitive.attributes;
+        if document.root.textures.is_empty() {
+            // Nothing will look at coordinates and tangents.
+            (attributes.tangent, attributes.texcoord_0, attributes.texcoord_1) = (None, None, None);
+        }
+        let key = (attributes, primitive.indices, mode);
         if let Some(&stored) = self.stored.get(&key) {
             return Ok(Some(stored));
         }
@@ -118,7 +123,8 @@ impl Primitives {
         let corners = corners(document, primitive.indices, &view, path)?;
         self.incomplete += u64::from(mode == Mode::Triangles && corners.len() % 3 != 0);
         let shared = self.users.get(&positions).is_some_and(|&users| users > 1);
-        let mesh = build(document, &view, corners, mode, shared, path)?;
+        let views = Views::new(document, view, attributes, path)?;
+        let mesh = build(document, &views, corners, mode, shared, path)?;
         let stored = description.meshes.len() as u32;
         description.meshes.push(Arc::new(mesh));
         self.stored.insert(key, stored);
@@ -153,11 +159,73 @@ fn corners(document: &Document<'_>, indices: Option<u32>, positions: &View<'_>, 
     }
 }
 
+/// The accessors of a primitive's attributes.
+struct Views<'a> {
+    positions: View<'a>,
+    normals: Option<View<'a>>,
+    tangents: Option<View<'a>>,
+    uvs: [Option<View<'a>>; 2],
+}
+
+impl<'a> Views<'a> {
+    /// Those of `attributes`, the primitive at `path`.
+    ///
+    /// # Errors
+    /// What is wrong with the accessors; another number of elements than there are `positions`.
+    fn new(document: &'a Document<'_>, positions: View<'a>, attributes: Attributes, path: &str) -> Result<Self> {
+        let view = |accessor: Option<u32>, expected: Expected, name: &str| {
+            let Some(accessor) = accessor else { return Ok(None) };
+            let path = format!("{path}.attributes.{name}");
+            let view = document.view(accessor, expected, &path)?;
+            if view.count != positions.count {
+                let what = format!("expected as many as of POSITION, {}, found {}", positions.count, view.count);
+                return Err(document.error(path, what));
+            }
+            Ok(Some(view))
+        };
+        Ok(Self {
+            positions,
+            normals: view(attributes.normal, NORMALS, "NORMAL")?,
+            tangents: view(attributes.tangent, TANGENTS, "TANGENT")?,
+            uvs: [
+                view(attributes.texcoord_0, COORDINATES, "TEXCOORD_0")?,
+                view(attributes.texcoord_1, COORDINATES, "TEXCOORD_1")?,
+            ],
+        })
+    }
+
+    /// Bytes of one vertex in memory.
+    fn vertex_bytes(&self) -> usize {
+        let uvs = self.uvs.iter().flatten().count() * size_of::<[f32; 2]>();
+        let normal = self.normals.map_or(0, |_| size_of::<[f32; 3]>());
+        let tangent = self.tangents.map_or(0, |_| size_of::<[f32; 4]>());
+        size_of::<DVec3>() + uvs + normal + tangent
+    }
+
+    /// The mesh of `triangles` whose vertices are the `vertices` of the accessors.
+    fn mesh(&self, vertices: impl Iterator<Item = usize> + Clone, triangles: Vec<[u32; 3]>) -> Mesh {
+        Mesh {
+            positions: vertices.clone().map(|v| DVec3::from_array(self.positions.numbers(v))).collect(),
+            triangles,
+            groups: Vec::new(),
+            normals: attribute(self.normals, vertices.clone()),
+            uvs: self.uvs.map(|uv| attribute(uv, vertices.clone())),
+            tangents: attribute(self.tangents, vertices),
+        }
+    }
+}
+
+/// The numbers of `view` at `vertices`, none without a view.
+fn attribute<const N: usize>(view: Option<View<'_>>, vertices: impl Iterator<Item = usize>) -> Attribute<[f32; N]> {
+    let values = view.map(|view| vertices.map(|v| view.numbers::<N>(v).map(|x| x as f32)).collect());
+    Attribute { values: values.unwrap_or_default(), indices: Vec::new() }
+}
+
 /// The mesh of `corners`. Vertices keep the file's order; of those that several primitives share, each mesh has the
 /// ones that it uses: it could be few of very many.
 fn build(
     document: &Document<'_>,
-    positions: &View<'_>,
+    views: &Views<'_>,
     mut corners: Vec<u32>,
     mode: Mode,
     shared: bool,
@@ -165,20 +233,18 @@ fn build(
 ) -> Result<Mesh> {
     spend(document, mode.count(corners.len()), size_of::<[u32; 3]>(), path)?;
     let mut triangles = mode.triangles(&corners);
-    let point = |v: usize| DVec3::from_array(positions.numbers(v));
-    let positions = if shared {
+    if shared {
         corners.sort_unstable();
         corners.dedup();
-        spend(document, corners.len(), size_of::<DVec3>(), path)?;
+        spend(document, corners.len(), views.vertex_bytes(), path)?;
         for corner in triangles.iter_mut().flatten() {
             *corner = corners.partition_point(|v| v < corner) as u32;
         }
-        corners.iter().map(|&v| point(v as usize)).collect()
+        Ok(views.mesh(corners.iter().map(|&v| v as usize), triangles))
     } else {
-        spend(document, positions.count, size_of::<DVec3>(), path)?;
-        (0..positions.count).map(point).collect()
-    };
-    Ok(Mesh { positions, triangles, groups: Vec::new(), ..Mesh::default() })
+        spend(document, views.positions.count, views.vertex_bytes(), path)?;
+        Ok(views.mesh(0..views.positions.count, triangles))
+    }
 }
 
 fn spend(document: &Document<'_>, count: usize, size: usize, path: impl Display) -> Result<()> {

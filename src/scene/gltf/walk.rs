@@ -1,4 +1,5 @@
-//! The walk over the nodes of a scene: groups, instances and cameras of the description.
+//! The walk over the nodes of a scene: groups, instances, cameras and lights of the
+//! description.
 
 use std::collections::HashSet;
 
@@ -21,7 +22,7 @@ const AFFINE: f64 = 1e-6;
 /// Places the nodes `roots` and those below them.
 ///
 /// # Errors
-/// What is wrong with nodes, their meshes, cameras and instances; a node that the scene names twice; more than
+/// What is wrong with nodes, their meshes, cameras, lights and instances; a node that the scene names twice; more than
 /// [`MAX_PLACEMENTS`] instances.
 pub fn place(document: &Document<'_>, roots: &[u32], description: &mut Description) -> Result<()> {
     let mut walk = Walk {
@@ -100,6 +101,9 @@ impl Walk<'_, '_> {
                 camera.name = format!("{} (node {index})", camera.name);
             }
             self.description.cameras.push(camera);
+        }
+        if let Some(light) = node.extensions.as_ref().and_then(|e| e.light) {
+            self.description.lights.push(look::light(self.document, light.light, index, &to_world)?);
         }
         if !node.children.is_empty() && frame.depth < MAX_DEPTH {
             let name = name(node.name.as_deref());

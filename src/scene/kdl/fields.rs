@@ -131,6 +131,31 @@ impl<'s, 'n, 'a> Fields<'s, 'n, 'a> {
         }
     }
 
+    /// One number from 0 to 1, `default` if the field is absent.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub fn share(&self, name: &str, default: f64) -> Result<f64> {
+        match self.number(name)? {
+            None => Ok(default),
+            Some(x) if (0.0..=1.0).contains(&x) => Ok(x),
+            Some(x) => Err(self.error_at(name, format!("`{name}` takes a number from 0 to 1, found {x}"))),
+        }
+    }
+
+    /// Whether field `name` stands there, alone or as `#true`.
+    ///
+    /// # Errors
+    /// Other values.
+    pub fn flag(&self, name: &str) -> Result<bool> {
+        match self.field(name).map(|field| field.values) {
+            None => Ok(false),
+            Some([]) => Ok(true),
+            Some([Entry { value: Value::Bool(on), .. }]) => Ok(*on),
+            Some(_) => Err(self.error_at(name, format!("expected `{name}` alone, or {name}=#true"))),
+        }
+    }
+
     /// A whole number in `range`, `default` if the field is absent.
     ///
     /// # Errors

@@ -101,7 +101,11 @@ impl<'a, 'n> Lowering<'a, 'n> {
         }
     }
 
-    fn fields<'s>(&'s self, node: &'n Node<'a>, allowed: &[&str], others: &[&str]) -> Result<Fields<'s, 'n, 'a>> {
+    /// The fields of `node`, see [`Fields::collect`].
+    ///
+    /// # Errors
+    /// Those of [`Fields::collect`].
+    pub fn fields<'s>(&'s self, node: &'n Node<'a>, allowed: &[&str], others: &[&str]) -> Result<Fields<'s, 'n, 'a>> {
         Fields::collect(&self.scope, node, allowed, others)
     }
 
@@ -248,57 +252,6 @@ impl<'a, 'n> Lowering<'a, 'n> {
         Ok(items[choice as usize])
     }
 
-    /// `mesh "file.ply" units=mm`.
-    fn mesh_file(&mut self, node: &'n Node<'a>, place: Place) -> Result<()> {
-        let (mesh, scale, place) = self.mesh_of(node, place)?;
-        self.add(ItemKind::Mesh(mesh), scale, place, node.span)
-    }
-
-    /// The mesh of a `mesh` statement, the scale of its unit, where it goes.
-    ///
-    /// # Errors
-    /// The first thing that is wrong in the statement or the file.
-    pub fn mesh_of(&mut self, node: &'n Node<'a>, place: Place) -> Result<(u32, DAffine3, Place)> {
-        const ALLOWED: [&str; 2] = ["units", "material"];
-        let fields = self.fields(node, &ALLOWED, &transform::NAMES)?;
-        let (written, span) = fields.title()?.ok_or_else(|| fields.error("expected `mesh \"file.ply\"`"))?;
-        let place = self.place(&fields, &fields.rest, &ALLOWED, place)?;
-        let scale = match fields.name("units")? {
-            None => 1.0,
-            Some((name, span)) => {
-                let fail = |what: String| self.scope.source.error(span, what);
-                let metres = settings::metres_per(name).ok_or_else(|| fail(settings::unknown_unit(name)))?;
-                let unit = self.metres.ok_or_else(|| fail("the scene must say its own `units` first".into()))?;
-                metres / unit
-            }
-        };
-        drop(fields);
-        let mesh = match self.store.find(&Key::Written(written.into())) {
-            Some(mesh) => mesh,
-            None => self.read_mesh(written, span)?,
-        };
-        Ok((mesh, DAffine3::from_scale(glam::DVec3::splat(scale)), place))
-    }
-
-    fn read_mesh(&mut self, written: &str, span: Span) -> Result<u32> {
-        let source = self.scope.source;
-        let file = self.files.resolve(written).map_err(|what| source.error(span, what))?;
-        let key = Key::File(file.clone());
-        let mesh = match self.store.find(&key) {
-            Some(mesh) => mesh,
-            None => {
-                let read = (self.files.read)(&file).map_err(|e| match e {
-                    Error::Io { source: e, .. } => source.error(span, format!("cannot read {}: {e}", quote(written))),
-                    other => other,
-                })?;
-                self.store.digests.push(read.digest);
-                self.store.add(Some(key), read.mesh)
-            }
-        };
-        self.store.alias(Key::Written(written.into()), mesh);
-        Ok(mesh)
-    }
-
     /// `polygon { point 0 0 0; point 1 0 0; point 0 1 0 }`.
     fn polygon(&mut self, node: &'n Node<'a>, place: Place) -> Result<()> {
         let fields = self.fields(node, &["material"], &transform::NAMES)?;
@@ -306,18 +259,27 @@ impl<'a, 'n> Lowering<'a, 'n> {
         let (points, transforms): (Vec<_>, Vec<_>) = fields.rest.iter().copied().partition(|n| n.name == "point");
         let place = self.place(&fields, &transforms, &["point", "material"], place)?;
         let mut corners = Vec::with_capacity(points.len());
+        let mut uvs = Vec::new();
         for point in points {
             let fields = Fields::collect(&self.scope, point, &[], NO_REST)?;
             match *numbers_of(&self.scope, &point.entries)?.as_slice() {
                 [x, y, z] => corners.push(glam::DVec3::new(x, y, z)),
-                _ => return Err(fields.error("`point` takes three numbers")),
+                [x, y, z, u, v] => {
+                    corners.push(glam::DVec3::new(x, y, z));
+                    // A picture's v points down in a mesh, a scene file's up.
+                    uvs.push([u as f32, 1.0 - v as f32]);
+                }
+                _ => return Err(fields.error("`point` takes three numbers, or five with texture coordinates")),
             }
+        }
+        if !uvs.is_empty() && uvs.len() < corners.len() {
+            return Err(fields.error("expected texture coordinates at all points of the polygon, or at none"));
         }
         if corners.len() < 3 {
             return Err(fields.error(format!("a polygon has at least three points, found {}", corners.len())));
         }
         self.allow_triangles(corners.len() as u64 - 2, node)?;
-        let mesh = self.store.add(None, polygon(corners));
+        let mesh = self.store.add(None, polygon(corners, uvs));
         self.add(ItemKind::Mesh(mesh), DAffine3::IDENTITY, place, node.span)
     }
 

@@ -1,12 +1,13 @@
 //! Meshes of a scene: files, generated ones, polygons. Each distinct one is stored once.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::error::Result;
 use crate::scene::description::{Description, Material};
 use crate::scene::mesh::Mesh;
+use crate::scene::obj::looks::Looks;
 use crate::scene::reference::References;
 
 /// Most triangles that generators and polygons of one document may make.
@@ -19,6 +20,8 @@ pub struct MeshFile {
     pub mesh: Mesh,
     /// SHA-256 of the file's bytes.
     pub digest: [u8; 32],
+    /// What the file says of the looks of its materials.
+    pub looks: Looks,
 }
 
 /// How mesh references become meshes.
@@ -93,10 +96,45 @@ impl Store {
     }
 }
 
-/// The polygon with corners `positions`, fanned from its first corner.
-pub fn polygon(positions: Vec<glam::DVec3>) -> Mesh {
+/// The polygon with corners `positions`, fanned from its first corner, with texture coordinates if there are any.
+pub fn polygon(positions: Vec<glam::DVec3>, uvs: Vec<[f32; 2]>) -> Mesh {
     let triangles = (2..positions.len() as u32).map(|i| [0, i - 1, i]).collect();
-    Mesh { positions, triangles, groups: Vec::new(), ..Mesh::default() }
+    let mut mesh = Mesh { positions, triangles, ..Mesh::default() };
+    mesh.uvs[0].values = uvs;
+    mesh
+}
+
+/// Adds the materials and textures of `file`, whose mesh is `mesh`. Those that `declared` knows by name look as the
+/// scene says; a name that another file took is written with the file's name behind it, in the mesh too.
+pub fn add_looks(
+    description: &mut Description,
+    mesh: &mut Mesh,
+    looks: Looks,
+    file: &Path,
+    declared: impl Fn(&str) -> bool,
+) {
+    let first = description.textures.len() as u32;
+    let file_name = file.file_name().unwrap_or_default().to_string_lossy();
+    let mut taken: HashSet<String> = description.materials.iter().map(|m| m.name.clone()).collect();
+    for mut material in looks.materials {
+        if declared(&material.name) {
+            continue;
+        }
+        if taken.contains(&material.name) {
+            let own = format!("{} ({file_name})", material.name);
+            let numbered = (2..).map(|n| format!("{own} {n}"));
+            let free = std::iter::once(own.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(own);
+            for group in mesh.groups.iter_mut().filter(|g| g.material == material.name) {
+                group.material.clone_from(&free);
+            }
+            material.name = free;
+        }
+        material.textures.uses_mut().for_each(|used| used.texture += first);
+        taken.insert(material.name.clone());
+        description.materials.push(material);
+    }
+    description.textures.extend(looks.textures);
+    description.warnings.extend(looks.warnings.into_iter().map(|what| format!("{file_name}: {what}")));
 }
 
 /// Gives every material name that meshes use and `description` lacks the default look.

@@ -1,22 +1,29 @@
 //! lanecast's own scene format: KDL documents that people write by hand. docs/SCENES.md is its reference.
 //!
-//! A file passes through `source` (text and errors), `syntax` (nodes), then `settings` (cameras, lights,
-//! materials) and `lower` (what is placed where). `fields` reads a statement's values, `expression` computes them.
+//! A file passes through `source` (text and errors), `syntax` (nodes), then `settings` (cameras), `lights`,
+//! `materials`, `environment`, and `lower` (what is placed where). `fields` reads a statement's values, `expression` computes them.
 //!
 //! Bounds on any input: [`MAX_BYTES`] of text, `syntax::MAX_NODES` nodes and values, `syntax::MAX_DEPTH`
 //! nested blocks, `lower::MAX_ITEMS` items after repeats, [`meshes::MAX_GENERATED`] generated triangles, and a
 //! step count on repeats. Measured, the worst documents take under 0.5 GiB (generated meshes at most 1 GiB more).
 
 mod cycles;
+mod environment;
 mod expression;
 mod fields;
 mod flake;
 mod hash;
+mod images;
+mod lights;
 mod lower;
+mod materials;
+mod mesh_files;
 pub mod meshes;
+mod metals;
 mod scope;
 mod settings;
 mod shapes;
+mod sky;
 mod solids;
 pub(crate) mod source;
 pub(crate) mod syntax;
@@ -32,7 +39,9 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
+use self::images::Images;
 use self::lower::{Lowering, Place};
+use self::materials::Mix;
 use self::meshes::{MeshFiles, Store, add_mesh_materials};
 use self::scope::Scope;
 use self::source::{Source, quote};
@@ -44,7 +53,7 @@ use crate::scene::description::{Description, Group, GroupId};
 pub const MAX_BYTES: u64 = 64 << 20;
 
 /// Statements that may stand once in a document.
-const ONCE: [&str; 5] = ["scene", "units", "precision", "background", "ambient"];
+const ONCE: [&str; 6] = ["scene", "units", "precision", "background", "ambient", "environment"];
 
 /// Reads the scene in `bytes`.
 ///
@@ -96,6 +105,7 @@ pub fn parse(
 fn declare<'a, 'n>(lowering: &mut Lowering<'a, 'n>, nodes: &'n [Node<'a>]) -> Result<()> {
     let source = lowering.scope.source;
     let mut seen = HashSet::new();
+    let (mut images, mut mixes) = (Images::new(lowering.files), Vec::new());
     for node in nodes {
         let name = node.name.as_ref();
         if ONCE.contains(&name) && !seen.insert(name) {
@@ -103,7 +113,7 @@ fn declare<'a, 'n>(lowering: &mut Lowering<'a, 'n>, nodes: &'n [Node<'a>]) -> Re
         }
         match name {
             "units" => lowering.metres = Some(settings::units(&lowering.scope, node)?),
-            "material" => material(lowering, node)?,
+            "material" => mixes.extend(material(lowering, node, &mut images)?),
             "define" => {
                 let Some((title, span)) = node.title() else {
                     return Err(source.error(node.span, "expected `define \"name\" { ... }`"));
@@ -118,23 +128,35 @@ fn declare<'a, 'n>(lowering: &mut Lowering<'a, 'n>, nodes: &'n [Node<'a>]) -> Re
             _ => {}
         }
     }
+    let known = &lowering.materials;
+    let find = |name: &str| known.get(name).copied();
+    materials::resolve(&lowering.scope, &mixes, &mut lowering.description.materials, find, known.keys().copied())?;
+    let (textures, digests) = images.decode(source)?;
+    lowering.description.textures = textures;
+    lowering.store.digests.extend(digests);
     Ok(())
 }
 
-fn material<'n>(lowering: &mut Lowering<'_, 'n>, node: &'n Node<'_>) -> Result<()> {
-    let material = settings::material(&lowering.scope, node)?;
+fn material<'a, 'n>(
+    lowering: &mut Lowering<'a, 'n>,
+    node: &'n Node<'a>,
+    images: &mut Images<'_>,
+) -> Result<Option<Mix<'n>>> {
     let materials = &mut lowering.description.materials;
     let (name, span) = node.title().unwrap_or(("", node.span));
-    if name == "default" && materials[0] == Default::default() {
+    let is_default = name == "default" && materials[0] == Default::default();
+    let id = if is_default { 0 } else { materials.len() as u32 };
+    let (material, mix) = materials::material(&lowering.scope, node, id, images)?;
+    if is_default {
         materials[0] = material;
-        return Ok(());
+        return Ok(mix);
     }
     if lowering.materials.contains_key(name) {
         return Err(lowering.scope.source.error(span, format!("material {} is defined twice", quote(name))));
     }
-    lowering.materials.insert(name, materials.len() as u32);
+    lowering.materials.insert(name, id);
     materials.push(material);
-    Ok(())
+    Ok(mix)
 }
 
 /// Carries out one statement of the top level.
@@ -147,7 +169,12 @@ fn statement<'a, 'n>(lowering: &mut Lowering<'a, 'n>, node: &'n Node<'a>) -> Res
         "precision" => description.precision = Some(settings::precision(scope, node)?),
         "background" => description.background = settings::only_colour(scope, node)?,
         "ambient" => description.ambient = settings::only_colour(scope, node)?,
-        "light" => description.lights.push(settings::light(scope, node)?),
+        "light" => description.lights.push(lights::light(scope, node)?),
+        "environment" => {
+            let (environment, digest) = environment::environment(scope, node, lowering.files)?;
+            description.environment = Some(environment);
+            lowering.store.digests.extend(digest);
+        }
         "camera" => {
             let camera = settings::camera(scope, node)?;
             if !lowering.camera_names.insert(camera.name.clone()) {

@@ -1,4 +1,4 @@
-//! Statements about the whole scene: its name and units, cameras, lights, background, materials.
+//! Statements about the whole scene: its name and units, cameras, background.
 
 use glam::DVec3;
 
@@ -7,11 +7,11 @@ use super::scope::Scope;
 use super::source::{Span, near, quote};
 use super::syntax::{Node, Value};
 use crate::error::{Error, Result};
-use crate::scene::description::{CameraDescription, Light, Material, Precision, Projection};
+use crate::scene::description::{CameraDescription, Precision, Projection};
 
-/// The statements of this file; all belong to the top level.
-pub const NAMES: [&str; 9] =
-    ["scene", "units", "precision", "parameter", "camera", "light", "background", "ambient", "material"];
+/// Statements that belong to the top level.
+pub const NAMES: [&str; 10] =
+    ["scene", "units", "precision", "parameter", "camera", "light", "background", "ambient", "environment", "material"];
 
 /// Names of units and their length in metres.
 pub const UNITS: [(&str, f64); 8] = [
@@ -161,50 +161,4 @@ pub fn camera(scope: &Scope<'_>, node: &Node<'_>) -> Result<CameraDescription> {
         }
     };
     Ok(CameraDescription { name: name.into(), eye, look_at, up, projection })
-}
-
-/// `light point { position ..; intensity .. }` or `light directional { direction ..; irradiance .. }`.
-///
-/// # Errors
-/// Other kinds, fields that do not fit.
-pub fn light(scope: &Scope<'_>, node: &Node<'_>) -> Result<Light> {
-    const KINDS: [&str; 2] = ["point", "directional"];
-    let kind = node.entries.iter().find(|e| e.name.is_none());
-    let Some(Value::Text(name)) = kind.map(|e| &e.value) else {
-        return Err(scope.source.error(node.span, "expected `light point` or `light directional`"));
-    };
-    let allowed: &[&str] = match name.as_ref() {
-        "point" => &["position", "intensity"],
-        "directional" => &["direction", "irradiance"],
-        _ => {
-            let span = kind.map_or(node.span, |e| e.span);
-            let what = format!("unknown light {}: expected point or directional", quote(name));
-            return Err(scope.source.error_near(span, what, name, KINDS));
-        }
-    };
-    let fields = Fields::collect(scope, node, allowed, NO_REST)?;
-    fields.title()?;
-    let strength = fields.colour(allowed[1], f64::INFINITY)?.unwrap_or(DVec3::ONE);
-    let missing = || fields.error(format!("a {name} light needs a `{}`", allowed[0]));
-    Ok(match name.as_ref() {
-        "point" => Light::Point { position: fields.vector(allowed[0])?.ok_or_else(missing)?, intensity: strength },
-        _ => Light::Directional { direction: fields.direction(allowed[0])?.ok_or_else(missing)?, irradiance: strength },
-    })
-}
-
-/// `material "red" { diffuse ..; mirror ..; emission .. }`.
-///
-/// # Errors
-/// Fields that do not fit, reflectances above 1.
-pub fn material(scope: &Scope<'_>, node: &Node<'_>) -> Result<Material> {
-    let fields = Fields::collect(scope, node, &["diffuse", "mirror", "emission"], NO_REST)?;
-    let (name, _) = fields.title()?.ok_or_else(|| fields.error("a material needs a name"))?;
-    let plain = Material::default();
-    Ok(Material {
-        name: name.into(),
-        diffuse: fields.colour("diffuse", 1.0)?.unwrap_or(plain.diffuse),
-        mirror: fields.colour("mirror", 1.0)?.unwrap_or(plain.mirror),
-        emission: fields.colour("emission", f64::INFINITY)?.unwrap_or(plain.emission),
-        ..plain
-    })
 }

@@ -13,7 +13,8 @@ fn read_fake(path: &Path) -> Result<meshes::MeshFile> {
     let groups = vec![MeshGroup { name: String::new(), material: "steel".into(), first: 0, count: 1 }];
     let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
     let digest = [path.as_os_str().len() as u8; 32];
-    Ok(meshes::MeshFile { mesh: Mesh { positions, triangles: vec![[0, 1, 2]], groups, ..Mesh::default() }, digest })
+    let mesh = Mesh { positions, triangles: vec![[0, 1, 2]], groups, ..Mesh::default() };
+    Ok(meshes::MeshFile { mesh, digest, looks: Default::default() })
 }
 
 fn scene_with(text: &str, set: &[(&str, &str)]) -> Result<Description> {

@@ -43,6 +43,21 @@ pub fn check_invertible(scope: &Scope<'_>, transform: DAffine3, span: Span) -> R
     Err(scope.source.error(span, "this transform flattens or overflows space: it cannot be inverted"))
 }
 
+/// The rotation of the statement `node`: as a transform, or `rotate 30` about y.
+///
+/// # Errors
+/// Wrong arguments.
+pub fn rotation(scope: &Scope<'_>, node: &Node<'_>) -> Result<DMat3> {
+    let fields = Fields::collect(scope, node, &[], NO_REST)?;
+    if let [only] = node.entries.as_slice() {
+        return match *numbers_of(scope, std::slice::from_ref(only))?.as_slice() {
+            [degrees] => Ok(turn(DVec3::Y, degrees).matrix3),
+            _ => Err(fields.error("expected `rotate 30`, or an axis and degrees")),
+        };
+    }
+    Ok(rotate(scope, &fields)?.matrix3)
+}
+
 fn one(scope: &Scope<'_>, node: &Node<'_>) -> Result<DAffine3> {
     if node.name == "shear" {
         return shear(scope, node);

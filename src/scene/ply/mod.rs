@@ -1,7 +1,8 @@
 //! Stanford PLY: text and both binary forms.
 //!
 //! Source: Greg Turk, "The PLY Polygon File Format", 1994. Read are the element `vertex` (`x`, `y`, `z` of any
-//! scalar type, in any order), the element `face` (the list `vertex_indices` or `vertex_index`, of any types,
+//! scalar type, in any order; `nx`, `ny`, `nz` as shading normals; `u`, `v` or `s`, `t` or `texture_u`, `texture_v` as texture
+//! coordinates), the element `face` (the list `vertex_indices` or `vertex_index`, of any types,
 //! polygons fanned in place) and the element `tristrips` (the same list; -1 starts a new strip, every second
 //! triangle is turned so that all keep the winding of the first). Other properties and elements are passed over.
 //! Values keep their declared type: a text number of a `float` property is rounded to f32.
@@ -25,6 +26,12 @@ use crate::error::Result;
 const MAX_TRIANGLES: usize = u32::MAX as usize - 1;
 /// Names of the list that holds a polygon's corners.
 const LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
+/// Names of texture coordinates, by different writers.
+const COORDINATES: [[&str; 2]; 3] = [["u", "v"], ["s", "t"], ["texture_u", "texture_v"]];
+/// Where a vertex's normal and texture coordinates stand behind its position, and how many numbers there are.
+const NORMAL: usize = 3;
+const UV: usize = 6;
+const SLOTS: usize = 8;
 
 /// Reads the bytes of a PLY file; `file` is only for error messages.
 ///
@@ -113,25 +120,47 @@ struct Body {
 
 impl Body {
     fn vertices<V: Values>(&mut self, element: &Element, values: &mut V) -> Result<()> {
-        let mut axis_of = vec![None; element.properties.len()];
+        let scalar =
+            |name: &str| element.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)));
+        let mut slot_of = vec![None; element.properties.len()];
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-            let found = element.properties.iter().position(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)));
-            let Some(found) = found else {
+            let Some(found) = scalar(name) else {
                 let what = format!("expected a scalar property `{name}` of the element `vertex`");
                 return Err(values.header_error(element.count_at, what));
             };
-            axis_of[found] = Some(axis);
+            slot_of[found] = Some(axis);
         }
-        self.mesh.positions.reserve_exact(element.count as usize);
-        for _ in 0..element.count {
-            let mut position = [0.0; 3];
-            for (property, axis) in element.properties.iter().zip(&axis_of) {
-                match (property.kind, axis) {
-                    (Kind::Scalar(scalar), Some(axis)) => position[*axis] = values.float(scalar)?,
+        // What is not there in full is not there.
+        let mut optional = |first: usize, names: &[&str]| {
+            let found: Option<Vec<usize>> = names.iter().map(|name| scalar(name)).collect();
+            for (slot, property) in (first..).zip(found.iter().flatten()) {
+                slot_of[*property] = Some(slot);
+            }
+            found.is_some()
+        };
+        let has_normals = optional(NORMAL, &["nx", "ny", "nz"]);
+        let has_uvs = COORDINATES.iter().any(|names| optional(UV, names));
+        let count = element.count as usize;
+        self.mesh.positions.reserve_exact(count);
+        self.mesh.normals.values.reserve_exact(if has_normals { count } else { 0 });
+        self.mesh.uvs[0].values.reserve_exact(if has_uvs { count } else { 0 });
+        for _ in 0..count {
+            let mut numbers = [0.0; SLOTS];
+            for (property, slot) in element.properties.iter().zip(&slot_of) {
+                match (property.kind, slot) {
+                    (Kind::Scalar(scalar), Some(slot)) => numbers[*slot] = values.float(scalar)?,
                     (kind, _) => pass_over_property(kind, values)?,
                 }
             }
-            self.mesh.positions.push(DVec3::from_array(position));
+            let [x, y, z, nx, ny, nz, u, v] = numbers;
+            self.mesh.positions.push(DVec3::new(x, y, z));
+            if has_normals {
+                self.mesh.normals.values.push([nx, ny, nz].map(|n| n as f32));
+            }
+            if has_uvs {
+                // A picture's v points down in a mesh, a file's up.
+                self.mesh.uvs[0].values.push([u as f32, 1.0 - v as f32]);
+            }
         }
         Ok(())
     }

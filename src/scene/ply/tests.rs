@@ -217,3 +217,21 @@ fn every_truncation_is_an_error() {
         assert!(parse(Path::new("m.ply"), &binary[..length]).is_err(), "{length}");
     }
 }
+
+#[test]
+fn normals_and_coordinates_in_any_order_and_only_in_full() {
+    let head = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float nz\nproperty float x\nproperty float t\n\
+                property float y\nproperty float z\nproperty uchar s\nproperty float nx\nproperty float ny\nend_header\n";
+    let mesh = read(format!("{head}6 1 8 2 3 7 4 5\n0 0 0.5 0 0 1 0 0\n"));
+    assert_eq!(mesh.positions, [DVec3::new(1., 2., 3.), DVec3::ZERO]);
+    assert_eq!(mesh.normals.values, [[4.0, 5.0, 6.0], [0.0; 3]]);
+    assert_eq!(mesh.uvs[0].values, [[7.0, -7.0], [1.0, 0.5]]);
+    let half =
+        read(format!("{}6 1 8 2 3 7 4 5\n0 0 0.5 0 0 1 0 0\n", head.replace(" ny", " red").replace(" s\n", " q\n")));
+    assert!(half.normals.values.is_empty() && half.uvs[0].values.is_empty());
+    let other = read(format!(
+        "{}6 1 8 2 3 7 4 5\n0 0 0.5 0 0 1 0 0\n",
+        head.replace(" t\n", " texture_v\n").replace(" s\n", " texture_u\n")
+    ));
+    assert_eq!(other.uvs, mesh.uvs);
+}

@@ -5,15 +5,16 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
+use super::runs::Runs;
 use super::{Class, Counts, Instance, Object, PlacedSolid, World, solids};
 use crate::bvh::{self, LEAF_PRIMS, Leaf, Preset, Tree};
 use crate::error::Result;
 use crate::lanes::Real;
 use crate::math::{Aabb, Affine, transformed_bounds};
-use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind, Placement};
+use crate::scene::assembly::{Assembly, Part, PartKind, Placement};
 use crate::scene::description::{Description, Shape};
 use crate::scene::mesh::Mesh;
-use crate::scene::solids::flat::{FlatLeaf, FlatTree};
+use crate::scene::solids::flat::FlatTree;
 use crate::shape::{
     BLOCK, Block, Cone, Cuboid, Cylinder, Degenerate, Disc, HalfSpace, Placed, PlacedRecord, Sphere, SphereRecord,
     Triangle, WorldSphere,
@@ -41,9 +42,9 @@ impl<S: Real> World<S> {
         }
         let instances: Vec<_> = assembly.placements.iter().map(|p| instance(p, &objects)).collect();
         let (top, top_blocks, unbounded_instances) = upper_tree(&instances, preset);
-        let materials = assembly.objects.iter().map(|o| material_runs(o, description)).collect();
+        let runs = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
         counts.build_seconds = start.elapsed().as_secs_f64();
-        Ok(Self { assembly, objects, instances, top, top_blocks, unbounded_instances, materials, counts })
+        Ok(Self { assembly, objects, instances, top, top_blocks, unbounded_instances, runs, counts })
     }
 }
 
@@ -265,27 +266,4 @@ fn upper_tree<S: Real>(instances: &[Instance<S>], preset: Preset) -> UpperTree<S
         })
         .collect();
     (tree, blocks, unbounded)
-}
-
-/// First primitive and material of each run of an object.
-fn material_runs(object: &AssemblyObject, description: &Description) -> Vec<(u32, u32)> {
-    let named = |name: &str| description.materials.iter().position(|m| m.name == name).map(|i| i as u32);
-    let mut runs = Vec::new();
-    for part in &object.parts {
-        runs.push((part.first_prim, part.material.unwrap_or(0)));
-        if let PartKind::Solids(tree) = &part.kind {
-            let own = |leaf: &FlatLeaf| leaf.material.or(part.material).unwrap_or(0);
-            runs.extend(tree.leaves.iter().zip(part.first_prim..).map(|(leaf, prim)| (prim, own(leaf))));
-        }
-        if let (None, PartKind::Mesh(mesh)) = (part.material, &part.kind) {
-            for group in &mesh.groups {
-                runs.push((part.first_prim + group.first, named(&group.material).unwrap_or(0)));
-            }
-        }
-    }
-    // Where two runs begin at one primitive the later one, the group's, counts.
-    runs.reverse();
-    runs.sort_by_key(|(first, _)| *first);
-    runs.dedup_by_key(|(first, _)| *first);
-    runs
 }

@@ -4,6 +4,7 @@
 //! instance is the identity is traced without an upper tree.
 
 mod compile;
+mod runs;
 mod solids;
 mod surface;
 
@@ -12,6 +13,7 @@ use glam::DVec3;
 pub use crate::bvh::Preset;
 pub use surface::Surface;
 
+use self::runs::Runs;
 use super::assembly::Assembly;
 use super::description::Shape;
 use crate::bvh::Tree;
@@ -130,8 +132,8 @@ pub struct World<S> {
     pub top_blocks: Vec<[u32; crate::bvh::LEAF_PRIMS]>,
     /// Instances without bounds.
     pub unbounded_instances: Vec<u32>,
-    /// Per object: first primitive of each run and its material, ascending.
-    materials: Vec<Vec<(u32, u32)>>,
+    /// Per object: its runs.
+    runs: Vec<Runs>,
     counts: Counts,
 }
 

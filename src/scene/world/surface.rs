@@ -26,6 +26,15 @@ pub struct Surface<'a> {
     triangle: Option<OnTriangle<'a>>,
 }
 
+/// See [`World::bare_triangle`].
+#[derive(Clone, Copy, Debug)]
+pub struct Bare {
+    /// Index into the description's materials.
+    pub material: u32,
+    /// First corner and the edges from it to the second and the third, world space; `None` if it is no such triangle.
+    pub triangle: Option<[DVec3; 3]>,
+}
+
 /// Where on which triangle.
 #[derive(Clone, Copy, Debug)]
 struct OnTriangle<'a> {
@@ -41,8 +50,9 @@ impl<S: Real> World<S> {
     /// `org`, `dir`: the ray in world space; `t`, `u`, `v`, `prim`, `inst`: a hit of an engine of this world.
     pub fn surface(&self, org: DVec3, dir: DVec3, t: f64, u: f64, v: f64, prim: u32, inst: u32) -> Surface<'_> {
         let placement = &self.assembly.placements[inst as usize];
-        let part = self.assembly.part_of(placement.object, prim);
-        let material = self.material(placement.object, prim);
+        let run = self.runs[placement.object as usize].of(prim);
+        let part = &self.assembly.objects[placement.object as usize].parts[run.part as usize];
+        let material = run.material;
         let is_plain = self.instances[inst as usize].identity && part.to_object == DAffine3::IDENTITY;
         let to_world = if is_plain { DAffine3::IDENTITY } else { placement.to_world * part.to_object };
         let spread = |local: DVec3| through(&placement.to_world, through(&part.to_object, local));
@@ -86,19 +96,40 @@ impl<S: Real> World<S> {
 
     /// Material of primitive `prim` of `object`: an index into the description's materials.
     pub fn material(&self, object: u32, prim: u32) -> u32 {
-        let runs = &self.materials[object as usize];
-        let after = runs.partition_point(|(first, _)| *first <= prim);
-        runs[after - 1].1
+        self.runs[object as usize].of(prim).material
+    }
+
+    /// A hit on a triangle whose mesh has no shading normals, for those who compute the rest themselves.
+    #[inline]
+    pub fn bare_triangle(&self, prim: u32, inst: u32) -> Bare {
+        let placement = &self.assembly.placements[inst as usize];
+        let run = self.runs[placement.object as usize].of(prim);
+        let part = &self.assembly.objects[placement.object as usize].parts[run.part as usize];
+        let triangle = match &part.kind {
+            PartKind::Mesh(mesh) if mesh.normals.values.is_empty() => {
+                let [a, b, c] = mesh.corners((prim - part.first_prim) as usize);
+                let (e1, e2) = (b - a, c - a);
+                let is_plain = self.instances[inst as usize].identity && part.to_object == DAffine3::IDENTITY;
+                Some(if is_plain {
+                    [a, e1, e2]
+                } else {
+                    let m = placement.to_world * part.to_object;
+                    [m.transform_point3(a), m.transform_vector3(e1), m.transform_vector3(e2)]
+                })
+            }
+            _ => None,
+        };
+        Bare { material: run.material, triangle }
     }
 }
 
 impl<S: Real> World<S> {
     /// First primitive, and the one after the last, of each run of primitives of `object` with one material.
     pub fn material_runs(&self, object: u32) -> impl Iterator<Item = (u32, u32)> {
-        let runs = &self.materials[object as usize];
+        let runs = self.runs[object as usize].list();
         let count = self.assembly.objects[object as usize].prim_count;
-        let ends = runs.iter().skip(1).map(|run| run.0).chain([count]);
-        runs.iter().map(|run| run.0).zip(ends)
+        let ends = runs.iter().skip(1).map(|run| run.first).chain([count]);
+        runs.iter().map(|run| run.first).zip(ends)
     }
 }
 

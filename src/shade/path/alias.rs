@@ -69,7 +69,10 @@ mod tests {
         for i in 0..n {
             counts[alias.choose((f64::from(i) + 0.5) / f64::from(n)).unwrap()] += 1;
         }
-        assert_eq!(counts, [30_000, 0, 10_000, 0, 40_000, 0]);
+        // One falls on the other side of a bin's boundary by rounding.
+        for (count, expected) in counts.into_iter().zip([30_000i32, 0, 10_000, 0, 40_000, 0]) {
+            assert!(i32::abs(count - expected) <= if expected > 0 { 2 } else { 0 }, "{counts:?}");
+        }
         assert_eq!([alias.chance(0), alias.chance(1), alias.chance(4), alias.chance(9)], [0.375, 0.0, 0.5, 0.0]);
         assert_eq!(Alias::new(&[0.0]).choose(0.5), None);
         assert_eq!(Alias::new(&[]).choose(0.5), None);

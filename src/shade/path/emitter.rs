@@ -5,11 +5,11 @@ use std::f64::consts::{PI, TAU};
 use glam::{DAffine3, DVec3};
 
 use super::lights::in_cone;
-use super::look::Looks;
 use crate::lanes::Real;
 use crate::scene::description::Light;
 use crate::scene::world::World;
 use crate::shade::lights::spot_share;
+use crate::shade::look::Looks;
 
 /// Something that shines.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +74,29 @@ pub struct Aim {
     pub is_point: bool,
 }
 
+/// An emitting triangle of even radiance: corner, edges, normal, area and radiances to the front and to the back, in
+/// one list for packets to copy.
+#[derive(Clone, Copy, Debug)]
+pub struct Flat {
+    /// Corner, edge, edge, normal, radiance to the front, radiance to the back: three numbers each; area.
+    pub numbers: [f64; 19],
+}
+
 impl Emitter {
+    /// What packets need of a triangle of even radiance.
+    pub fn flat(&self, looks: &Looks<'_>) -> Option<Flat> {
+        let Self::Triangle { corner, edges, normal, area, material, .. } = *self else { return None };
+        if looks.material(material).textures.emission.is_some() {
+            return None;
+        }
+        let mut numbers = [0.0; 19];
+        let vectors = [corner, edges[0], edges[1], normal, plain(looks, material, true), plain(looks, material, false)];
+        for (to, from) in numbers.iter_mut().zip(vectors.iter().flat_map(|v| v.to_array()).chain([area])) {
+            *to = from;
+        }
+        Some(Flat { numbers })
+    }
+
     /// A triangle with world-space `corners`.
     pub fn triangle(corners: [DVec3; 3], material: u32, prim: u32, inst: u32) -> Self {
         let [a, b, c] = corners;

@@ -5,13 +5,13 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::alias::Alias;
-use super::emitter::{Aim, Emitter};
-use super::look::Looks;
+use super::emitter::{Aim, Emitter, Flat};
 use super::sky::Sky;
 use crate::lanes::Real;
 use crate::scene::assembly::{Part, PartKind};
 use crate::scene::description::{Description, Light, Shape};
 use crate::scene::world::World;
+use crate::shade::look::Looks;
 
 /// Emitting primitives of an object: first primitive, number, and how many of the object come before.
 type Run = (u32, u32, u32);
@@ -19,6 +19,8 @@ type Run = (u32, u32, u32);
 /// Everything that shines.
 pub struct Lights<'a> {
     emitters: Vec<Emitter>,
+    /// Parallel to the emitters: what packets need of those that are even triangles.
+    flats: Vec<Option<Flat>>,
     alias: Alias,
     /// Per placement: the number of its first emitting primitive in the list; `u32::MAX` if it has none.
     first: Vec<u32>,
@@ -48,8 +50,10 @@ impl<'a> Lights<'a> {
         let radius = world.bounds().map_or(1.0, |(lo, hi)| 0.5 * (hi - lo).length()).max(1e-30);
         let mut weights: Vec<f64> = emitters.iter().map(|e| e.power(radius, looks)).collect();
         weights.extend(sky.as_ref().map(|sky| sky.brightness() * PI * radius * radius));
+        let flats = emitters.iter().map(|e| e.flat(looks)).collect();
         Self {
             emitters,
+            flats,
             alias: Alias::new(&weights),
             first,
             runs,
@@ -60,22 +64,33 @@ impl<'a> Lights<'a> {
         }
     }
 
+    /// The light that `choice` in [0, 1) falls on, and its chance.
+    #[inline]
+    pub fn choose(&self, choice: f64) -> Option<(usize, f64)> {
+        let index = self.alias.choose(choice)?;
+        Some((index, self.alias.chance(index)))
+    }
+
+    /// Light `index`, if it is a triangle that shines evenly.
+    #[inline]
+    pub fn flat(&self, index: usize) -> Option<&Flat> {
+        self.flats.get(index)?.as_ref()
+    }
+
     /// Whether nothing can be aimed at.
     pub fn is_empty(&self) -> bool {
         self.alias.choose(0.0).is_none()
     }
 
-    /// Aims from `from` at something that shines.
+    /// Aims from `from` at light `index`, whose chance is `chance`.
     pub fn aim<S: Real>(
         &self,
         from: DVec3,
-        choice: f64,
+        (index, chance): (usize, f64),
         place: [f64; 2],
         world: &World<S>,
         looks: &Looks<'_>,
     ) -> Option<Aim> {
-        let index = self.alias.choose(choice)?;
-        let chance = self.alias.chance(index);
         let aim = if index == self.sky_index {
             let sky = self.sky.as_ref()?;
             let (dir, pdf) = sky.sample(place)?;

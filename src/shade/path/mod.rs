@@ -15,32 +15,37 @@ mod alias;
 mod bsdf;
 mod emitter;
 mod lights;
-mod look;
 mod points;
 mod scatter;
 mod sky;
 mod stats;
-mod through;
 mod wave;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
 
+pub(super) use self::bsdf::fresnel;
 pub use self::stats::{BounceStats, PathStats};
 
 use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
 };
 use self::lights::Lights;
-use self::look::{Looks, Model};
-use self::points::{BASE, FIELDS, NORMAL, OFFSET, OUT, PARAM, POSITION, Points, SHADING, SQUEEZE, THROUGHPUT};
+use self::points::{
+    BASE, FIELDS, NORMAL, OFFSET, OUT, PARAM, POSITION, Points, RAW_CORNER, RAW_EDGE1, RAW_EDGE2, RAW_PLACE, SHADING,
+    SQUEEZE, THROUGHPUT,
+};
 use self::scatter::Chances;
 use self::wave::{Shadows, Wave};
+use super::look::{Look, Looks, Model};
 use super::offset::position_error;
-use super::shader::{Sample, Workspace};
+use super::sample::Sample;
+use super::shader::{Settings, Workspace};
+use super::through::{Again, MIXTURE, Through, number};
 use crate::camera::sobol::PixelPoints;
-use crate::lanes::Real;
+use crate::lanes::{Real, dot};
 use crate::ray::{Hits, Rays};
 use crate::scene::description::{Description, Light};
 use crate::scene::world::{Surface, World};
@@ -53,11 +58,13 @@ const SHADOW_ROUNDINGS: f64 = 256.0;
 pub(super) struct Paths<'a, S: Real> {
     world: &'a World<S>,
     engine: &'a dyn Engine<S>,
-    looks: Looks<'a>,
+    looks: Arc<Looks<'a>>,
     lights: Lights<'a>,
     /// Scatterings of a path at most.
     depth: u32,
     seed: u64,
+    /// Whether properties of first hits are wanted besides radiance.
+    first_hits: bool,
     shadow_end: S,
 }
 
@@ -69,7 +76,7 @@ pub(super) struct PathMemory<S> {
     now: Wave<S>,
     next: Wave<S>,
     shadows: Shadows<S>,
-    again: through::Again<S>,
+    again: Again<S>,
     /// What was counted.
     pub stats: PathStats,
 }
@@ -82,27 +89,27 @@ impl<S: Real> Default for PathMemory<S> {
             now: Wave::default(),
             next: Wave::default(),
             shadows: Shadows::default(),
-            again: through::Again::default(),
+            again: Again::default(),
             stats: PathStats::default(),
         }
     }
 }
 
 impl<'a, S: Real> Paths<'a, S> {
-    /// Paths of at most `depth` scatterings through `world`, compiled from `description`; `headlight` lights a scene
+    /// Paths of at most `settings.depth` scatterings through `world`, compiled from `description`; `headlight` lights a scene
     /// in which nothing shines.
     pub fn new(
         world: &'a World<S>,
         description: &'a Description,
+        looks: Arc<Looks<'a>>,
         engine: &'a dyn Engine<S>,
         headlight: Light,
-        depth: u32,
-        seed: u64,
+        settings: &Settings,
     ) -> Self {
-        let looks = Looks::new(description);
         let lights = Lights::new(world, description, &looks, headlight);
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
-        Self { world, engine, looks, lights, depth, seed, shadow_end }
+        let Settings { depth, seed, first_hits, .. } = *settings;
+        Self { world, engine, looks, lights, depth, seed, first_hits, shadow_end }
     }
 
     /// The radiance along each ray of the primary batch `rays` into `out`, which holds misses; see
@@ -140,7 +147,11 @@ impl<'a, S: Real> Paths<'a, S> {
     ) {
         let live = memory.now.path.len() as u64;
         let clock = Instant::now();
-        self.closest(bounce, sample, memory, work);
+        let through = Through { world: self.world, engine: self.engine, looks: &self.looks };
+        let (pixels, paths) = (&memory.pixels, &memory.now.path);
+        through.closest(&memory.now.rays, &mut work.hits, &mut work.scratch, &mut memory.again, None, |i, layer| {
+            number(pixels[paths[i] as usize], sample, bounce, layer)
+        });
         let traced = clock.elapsed();
         memory.points.iter_mut().for_each(Points::clear);
         for i in 0..memory.now.path.len() {
@@ -162,13 +173,17 @@ impl<'a, S: Real> Paths<'a, S> {
         work.rays.shadow += stats.shadows;
         // The primary rays are counted already.
         work.rays.scattered += if bounce == 0 { 0 } else { live };
-        self.shadows(memory, work, |path, light| {
+        let shadows = &memory.shadows;
+        let (hits, occluded, scratch) = (&mut work.hits, &mut work.occluded, &mut work.scratch);
+        let left = through.shadows(&shadows.rays, hits, occluded, scratch, &mut memory.again, false, None);
+        for ((&path, light), &left) in shadows.path.iter().zip(&shadows.light).zip(left) {
+            let light = DVec3::from(light.map(S::to_f64)) * left;
             let seen = &mut out[path as usize];
             seen.radiance += light;
             if bounce == 0 {
                 seen.direct += light;
             }
-        });
+        }
         stats.shadowing = clock.elapsed();
         memory.stats.add(bounce, &stats);
     }
@@ -182,7 +197,7 @@ impl<'a, S: Real> Paths<'a, S> {
             if points.len() == 0 {
                 continue;
             }
-            points.seal();
+            points.settle();
             let width = <S::Wide as crate::lanes::Lanes>::N;
             lanes += points.len().next_multiple_of(width) as u64;
             match Model::ALL[model] {
@@ -233,8 +248,22 @@ impl<'a, S: Real> Paths<'a, S> {
             }
             return;
         }
-        let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
         let (prim, inst) = (hits.prim[i], hits.inst[i]);
+        if bounce < self.depth {
+            let bare = self.world.bare_triangle(prim, inst);
+            if let (Some(triangle), Some(look)) = (bare.triangle, self.looks.uniform(bare.material)) {
+                if bounce == 0 {
+                    seen.alpha = 1.0;
+                    if self.first_hits {
+                        self.first_hit(org, dir, i, hits, seen);
+                    }
+                }
+                let fields = raw_fields(wave, i, hits, &triangle, look);
+                memory.points[look.model as usize].push(path, &fields, true);
+                return;
+            }
+        }
+        let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
         let surface = self.world.surface(org, dir, t, u, v, prim, inst);
         let from_front = surface.ng.dot(dir) <= 0.0;
         let emitted = self.looks.emission(surface.material, &surface, from_front);
@@ -249,7 +278,7 @@ impl<'a, S: Real> Paths<'a, S> {
         if bounce > 0 && bounce == self.depth {
             return;
         }
-        let choice = || through::number(memory.pixels[path as usize], sample, bounce, through::MIXTURE);
+        let choice = || number(memory.pixels[path as usize], sample, bounce, MIXTURE);
         let material =
             if self.looks.has_mixtures { self.looks.resolve(surface.material, choice()) } else { surface.material };
         let look = self.looks.look(material, &surface, from_front);
@@ -258,12 +287,7 @@ impl<'a, S: Real> Paths<'a, S> {
         let ns = self.shading_normal(material, &surface, from_front, ng, out_dir);
         if bounce == 0 {
             seen.alpha = 1.0;
-            seen.distance = t * dir.length();
-            seen.position = surface.position;
-            seen.normal = ng;
-            seen.shading_normal = ns;
-            seen.albedo = look.base;
-            (seen.inst, seen.prim, seen.material) = (inst, prim, surface.material);
+            self.first_hit(org, dir, i, hits, seen);
             if self.depth == 0 {
                 return;
             }
@@ -285,7 +309,22 @@ impl<'a, S: Real> Paths<'a, S> {
         fields[OFFSET] = S::from_f64(ng.abs().dot(error));
         fields[THROUGHPUT..THROUGHPUT + 3].copy_from_slice(&wave.throughput[i]);
         fields[SQUEEZE] = wave.squeeze[i];
-        memory.points[look.model as usize].push(path, &fields);
+        memory.points[look.model as usize].push(path, &fields, false);
+    }
+
+    /// What pictures show of the first hit, besides radiance.
+    fn first_hit(&self, org: DVec3, dir: DVec3, i: usize, hits: &Hits<S>, seen: &mut Sample) {
+        let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
+        let surface = self.world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);
+        let from_front = surface.ng.dot(dir) <= 0.0;
+        let ng = if from_front { surface.ng } else { -surface.ng };
+        let material = surface.material;
+        seen.distance = t * dir.length();
+        seen.position = surface.position;
+        seen.normal = ng;
+        seen.shading_normal = self.shading_normal(material, &surface, from_front, ng, -dir.normalize_or_zero());
+        seen.albedo = self.looks.look(material, &surface, from_front).base;
+        (seen.inst, seen.prim, seen.material) = (hits.inst[i], hits.prim[i], material);
     }
 
     /// The shading normal on the side of `ng`; `ng` itself where `out` is behind it.
@@ -294,6 +333,28 @@ impl<'a, S: Real> Paths<'a, S> {
         let ns = if from_front { ns } else { -ns };
         if ns.dot(out) > 1e-3 { ns } else { ng }
     }
+}
+
+/// The fields of a point on a bare triangle; the rest is computed in packets.
+#[inline]
+fn raw_fields<S: Real>(wave: &Wave<S>, i: usize, hits: &Hits<S>, triangle: &[DVec3; 3], look: &Look) -> [S; FIELDS] {
+    let mut fields = [S::ZERO; FIELDS];
+    let mut put = |at: usize, v: DVec3| (0..3).for_each(|axis| fields[at + axis] = S::from_f64(v[axis]));
+    put(RAW_CORNER, triangle[0]);
+    put(RAW_EDGE1, triangle[1]);
+    put(RAW_EDGE2, triangle[2]);
+    put(BASE, look.base);
+    let dir = wave.rays.dir(i);
+    let length = dot(dir, dir).sqrt();
+    let back = -(S::ONE / length);
+    (0..3).for_each(|axis| fields[OUT + axis] = dir[axis] * back);
+    (0..4).for_each(|k| fields[PARAM + k] = S::from_f64(look.param[k]));
+    fields[RAW_PLACE] = hits.u[i];
+    fields[RAW_PLACE + 1] = hits.v[i];
+    fields[RAW_PLACE + 2] = hits.t[i] * length;
+    fields[THROUGHPUT..THROUGHPUT + 3].copy_from_slice(&wave.throughput[i]);
+    fields[SQUEEZE] = wave.squeeze[i];
+    fields
 }
 
 impl<S: Real> PathMemory<S> {

@@ -1,7 +1,7 @@
-//! Points on surfaces as structures of arrays, one list per model of scattering, so that a packet has one model.
+//! Points on surfaces in packets, one list per model of scattering, so that a packet has one model.
 
-use crate::lanes::MAX_LANES;
-use crate::lanes::{Lanes, Lanes3, Real};
+use crate::lanes::space::{choose, cross, normalize};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot};
 
 /// First field of the position, world space.
 pub const POSITION: usize = 0;
@@ -24,22 +24,45 @@ pub const SQUEEZE: usize = 26;
 /// Number of fields.
 pub const FIELDS: usize = 27;
 
-/// Points of one model.
-#[derive(Clone, Debug, Default)]
-pub struct Points<S> {
-    fields: Vec<[S; FIELDS]>,
-    columns: Vec<Vec<S>>,
-    /// Path of each point.
-    pub path: Vec<u32>,
-}
+// What a raw point has instead, until it is settled.
+
+/// First corner of the triangle, world space.
+pub const RAW_CORNER: usize = POSITION;
+/// To the second corner.
+pub const RAW_EDGE1: usize = SHADING;
+/// To the third corner.
+pub const RAW_EDGE2: usize = NORMAL;
+/// Weights of the second and third corner, distance from the ray's origin.
+pub const RAW_PLACE: usize = PARAM + 4;
+
+/// Roundings of a raw point's triangle (see [`super::super::offset`]), with those of its weights.
+const TRIANGLE_ROUNDINGS: f64 = 14.0;
+/// Roundings of the ray, whose origin counts as position and distance.
+const RAY_ROUNDINGS: f64 = 16.0;
 
 /// One point's fields.
 pub type Fields<S> = [S; FIELDS];
 
+/// Sixteen points.
+#[derive(Clone, Debug)]
+struct Block<S> {
+    fields: [[S; MAX_LANES]; FIELDS],
+    /// Bit `i`: point `i` is raw.
+    raw: u32,
+}
+
+/// Points of one model.
+#[derive(Clone, Debug, Default)]
+pub struct Points<S> {
+    blocks: Vec<Block<S>>,
+    /// Path of each point.
+    pub path: Vec<u32>,
+}
+
 impl<S: Real> Points<S> {
     /// No points, keeping the memory.
     pub fn clear(&mut self) {
-        self.fields.clear();
+        self.blocks.clear();
         self.path.clear();
     }
 
@@ -48,21 +71,28 @@ impl<S: Real> Points<S> {
         self.path.len()
     }
 
-    /// Adds a point of path `path`.
-    pub fn push(&mut self, path: u32, fields: &Fields<S>) {
+    /// Adds a point of path `path`. A raw one, on a triangle without shading normals, has [`RAW_CORNER`] and so on
+    /// instead of position, normals and offset; its model has at most four parameters.
+    #[inline]
+    pub fn push(&mut self, path: u32, fields: &Fields<S>, is_raw: bool) {
+        let lane = self.path.len() % MAX_LANES;
+        if lane == 0 {
+            self.blocks.push(Block { fields: [[S::ZERO; MAX_LANES]; FIELDS], raw: 0 });
+        }
         self.path.push(path);
-        self.fields.push(*fields);
+        if let Some(block) = self.blocks.last_mut() {
+            for (column, &value) in block.fields.iter_mut().zip(fields) {
+                column[lane] = value;
+            }
+            block.raw |= u32::from(is_raw) << lane;
+        }
     }
 
-    /// Makes the columns that packets load from; the last point fills the last packet.
-    pub fn seal(&mut self) {
-        let padded = self.len().next_multiple_of(MAX_LANES);
-        self.columns.resize_with(FIELDS, Vec::new);
-        for (field, column) in self.columns.iter_mut().enumerate() {
-            column.clear();
-            column.extend(self.fields.iter().map(|point| point[field]));
-            if let Some(&last) = column.last() {
-                column.resize(padded, last);
+    /// Computes position, normals and offset of the raw points.
+    pub fn settle(&mut self) {
+        for block in self.blocks.iter_mut().filter(|block| block.raw != 0) {
+            for first in (0..MAX_LANES).step_by(S::Wide::N) {
+                settle(block, first);
             }
         }
     }
@@ -70,7 +100,7 @@ impl<S: Real> Points<S> {
     /// Field `field` of points `first..first + N`.
     #[inline(always)]
     pub fn scalar<V: Lanes<Scalar = S>>(&self, field: usize, first: usize) -> V {
-        V::load(&self.columns[field][first..])
+        V::load(&self.blocks[first / MAX_LANES].fields[field][first % MAX_LANES..])
     }
 
     /// Fields `field..field + 3` of the same.
@@ -78,4 +108,47 @@ impl<S: Real> Points<S> {
     pub fn vector<V: Lanes<Scalar = S>>(&self, field: usize, first: usize) -> Lanes3<V> {
         [0, 1, 2].map(|i| self.scalar(field + i, first))
     }
+}
+
+#[inline(always)]
+fn settle<S: Real>(block: &mut Block<S>, first: usize) {
+    let scalar = |field: usize| S::Wide::load(&block.fields[field][first..]);
+    let vector = |field: usize| [0, 1, 2].map(|i| scalar(field + i));
+    let raw = <S::Wide as Lanes>::Mask::from_bits(block.raw >> first);
+    let (corner, e1, e2) = (vector(RAW_CORNER), vector(RAW_EDGE1), vector(RAW_EDGE2));
+    let [u, v, distance] = vector(RAW_PLACE);
+    let out = vector(OUT);
+    let position: Lanes3<S::Wide> = [0, 1, 2].map(|i| v.mul_add(e2[i], u.mul_add(e1[i], corner[i])));
+    // Edges of length about one: products of very small or large ones would leave the range of numbers.
+    let length = |e: Lanes3<S::Wide>| e[0].abs() + e[1].abs() + e[2].abs();
+    let unit = |e: Lanes3<S::Wide>| {
+        let rcp = S::Wide::constant(1.0) / length(e);
+        e.map(|x| x * rcp)
+    };
+    let normal = normalize(cross(unit(e1), unit(e2)));
+    let zero = S::Wide::constant(0.0);
+    let behind = dot(normal, out).cmp_lt(zero);
+    let normal = choose(behind, normal.map(|x| -x), normal);
+    let gamma = |roundings: f64| {
+        let n = roundings * S::EPSILON.to_f64();
+        S::Wide::constant(n / (1.0 - n))
+    };
+    // The origin is no further off than the position and the distance together; two more for the position's own.
+    let (of_ray, of_triangle) = (gamma(2.0 * RAY_ROUNDINGS + 2.0), gamma(TRIANGLE_ROUNDINGS));
+    let offset = [0, 1, 2].map(|i| {
+        let size = corner[i].abs() + e1[i].abs() + e2[i].abs();
+        let reach = position[i].abs() + (out[i] * distance).abs();
+        normal[i].abs() * of_ray.mul_add(reach, of_triangle * size)
+    });
+    let offset = offset[0] + offset[1] + offset[2];
+    let mut put = |field: usize, value: S::Wide| {
+        let column = &mut block.fields[field][first..];
+        S::Wide::select(raw, value, S::Wide::load(column)).store(column);
+    };
+    for axis in 0..3 {
+        put(POSITION + axis, position[axis]);
+        put(SHADING + axis, normal[axis]);
+        put(NORMAL + axis, normal[axis]);
+    }
+    put(OFFSET, offset);
 }

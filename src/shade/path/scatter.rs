@@ -7,7 +7,7 @@ use super::bsdf::Bsdf;
 use super::points::{NORMAL, OFFSET, OUT, POSITION, Points, SHADING, SQUEEZE, THROUGHPUT};
 use super::wave::{Shadows, Wave};
 use crate::camera::sobol::{PixelPoints, fraction};
-use crate::lanes::space::{Frame, choose};
+use crate::lanes::space::{Frame, choose, scale, sub};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot};
 
 /// Bounces before paths may end by chance.
@@ -160,16 +160,50 @@ impl<S: Real> Paths<'_, S> {
         numbers: &Numbers<S>,
         shadows: &mut Shadows<S>,
     ) {
+        let target = self.targets(packet, path, numbers);
+        let one = S::Wide::constant(1.0);
+        let local = packet.frame.to_local(target.dir);
+        let (org, is_consistent) = packet.leave(target.dir, local);
+        let found = bsdf.eval(packet.out, local);
+        let odds = found.pdf / target.pdf;
+        let share = one / odds.mul_add(odds, one);
+        let weight = S::Wide::select(target.is_point, one, share) / target.pdf;
+        let light: Lanes3<S::Wide> =
+            [0, 1, 2].map(|i| packet.throughput[i] * found.value[i] * (target.radiance[i] * weight));
+        let sum = light[0] + light[1] + light[2];
+        let wanted = is_consistent & S::Wide::constant(0.0).cmp_lt(sum) & sum.cmp_lt(S::Wide::splat(S::INFINITY));
+        // To a place: from the ray's own origin, ending before t = 1.
+        let dir = [0, 1, 2].map(|i| target.place[i] - org[i] * target.near);
+        let far = target.near.cmp_lt(one);
+        let t_max = S::Wide::select(far, S::Wide::splat(S::INFINITY), S::Wide::splat(self.shadow_end));
+        let (org, dir, light, [t_max, ..]) = (spill(org), spill(dir), spill(light), spill([t_max; 3]));
+        for lane in lanes_of(wanted.bits(), path.len()) {
+            shadows.push(path[lane], at(&org, lane), at(&dir, lane), t_max[lane], at(&light, lane));
+        }
+    }
+
+    /// Something that shines for each point of the packet, by chance.
+    #[inline(always)]
+    fn targets(&self, packet: &Packet<S::Wide>, path: &[u32], numbers: &Numbers<S>) -> Targets<S::Wide> {
         let zero = [S::ZERO; MAX_LANES];
         let (mut dir, mut radiance, mut target) = ([zero; 3], [zero; 3], [zero; 3]);
         // Without light the density is 1 and the radiance 0.
-        let (mut pdf, mut near, mut points) = ([S::ONE; MAX_LANES], zero, 0);
+        let (mut pdf, mut near, mut points, mut even) = ([S::ONE; MAX_LANES], zero, 0, 0);
+        let mut flat = [zero; 19];
         let position = spill(packet.position);
         for lane in 0..path.len() {
+            let Some((index, chance)) = self.lights.choose(numbers.light_choice[lane].to_f64()) else { continue };
+            if let Some(triangle) = self.lights.flat(index) {
+                for (column, &number) in flat.iter_mut().zip(&triangle.numbers) {
+                    column[lane] = S::from_f64(number);
+                }
+                pdf[lane] = S::from_f64(chance);
+                even |= 1u32 << lane;
+                continue;
+            }
             let from = DVec3::from(at(&position, lane).map(S::to_f64));
             let place = [numbers.light[0][lane].to_f64(), numbers.light[1][lane].to_f64()];
-            let choice = numbers.light_choice[lane].to_f64();
-            let Some(aim) = self.lights.aim(from, choice, place, self.world, &self.looks) else { continue };
+            let Some(aim) = self.lights.aim(from, (index, chance), place, self.world, &self.looks) else { continue };
             for axis in 0..3 {
                 dir[axis][lane] = S::from_f64(aim.dir[axis]);
                 radiance[axis][lane] = S::from_f64(aim.radiance[axis]);
@@ -179,33 +213,90 @@ impl<S: Real> Paths<'_, S> {
             near[lane] = if aim.is_far { S::ZERO } else { S::ONE };
             points |= u32::from(aim.is_point) << lane;
         }
-        type Mask<S> = <<S as Real>::Wide as Lanes>::Mask;
         let load = |columns: &[Column<S>; 3]| [0, 1, 2].map(|i| S::Wide::load(&columns[i]));
-        let (one, pdf, near) = (S::Wide::constant(1.0), S::Wide::load(&pdf), S::Wide::load(&near));
-        let dir = load(&dir);
-        let local = packet.frame.to_local(dir);
-        let (org, is_consistent) = packet.leave(dir, local);
-        let found = bsdf.eval(packet.out, local);
-        let share = one / (one + (found.pdf / pdf) * (found.pdf / pdf));
-        let weight = S::Wide::select(Mask::<S>::from_bits(points), one, share) / pdf;
-        let arriving = load(&radiance);
-        let light: Lanes3<S::Wide> = [0, 1, 2].map(|i| packet.throughput[i] * found.value[i] * (arriving[i] * weight));
-        let sum = light[0] + light[1] + light[2];
-        let wanted = is_consistent & S::Wide::constant(0.0).cmp_lt(sum) & sum.cmp_lt(S::Wide::splat(S::INFINITY));
-        // To a place: from the ray's own origin, ending at t = 1.
-        let target = load(&target);
-        let dir = [0, 1, 2].map(|i| target[i] - org[i] * near);
-        let (org, dir, light) = (spill(org), spill(dir), spill(light));
-        let mut far = zero;
-        near.store(&mut far);
-        let mut bits = wanted.bits() & ((1u32 << path.len()) - 1);
-        while bits != 0 {
-            let lane = bits.trailing_zeros() as usize;
-            bits &= bits - 1;
-            let t_max = if far[lane] == S::ZERO { S::INFINITY } else { self.shadow_end };
-            shadows.push(path[lane], at(&org, lane), at(&dir, lane), t_max, at(&light, lane));
+        let others = Targets {
+            place: load(&target),
+            near: S::Wide::load(&near),
+            dir: load(&dir),
+            pdf: S::Wide::load(&pdf),
+            radiance: load(&radiance),
+            is_point: Mask::<S>::from_bits(points),
+        };
+        if even == 0 {
+            return others;
         }
+        let light = [S::Wide::load(&numbers.light[0]), S::Wide::load(&numbers.light[1])];
+        let flat = flat.map(|column| S::Wide::load(&column));
+        on_triangles(packet.position, &flat, light, Mask::<S>::from_bits(even), &others)
     }
+}
+
+/// Masks of packets.
+type Mask<S> = <<S as Real>::Wide as Lanes>::Mask;
+
+/// What a packet aims at.
+struct Targets<V: Lanes> {
+    /// The place, or far away the direction to it.
+    place: Lanes3<V>,
+    /// 1 for a place, 0 for a direction.
+    near: V,
+    /// Unit direction.
+    dir: Lanes3<V>,
+    /// Density per solid angle; of a point the chance of the light.
+    pdf: V,
+    /// Radiance from there; of a point irradiance.
+    radiance: Lanes3<V>,
+    /// Lights without extent.
+    is_point: V::Mask,
+}
+
+/// Uniform points of emitting triangles in the lanes `even`, whose chance is the density in `others`; `flat` are the
+/// numbers of [`super::emitter::Flat`].
+/// Source of the map: E. Heitz, *A Low-Distortion Map Between Triangle and Square*, 2019.
+#[inline(always)]
+fn on_triangles<V: Lanes>(
+    from: Lanes3<V>,
+    flat: &[V; 19],
+    [u, v]: [V; 2],
+    even: V::Mask,
+    others: &Targets<V>,
+) -> Targets<V> {
+    let (zero, one, half) = (V::constant(0.0), V::constant(1.0), V::constant(0.5));
+    let vector = |k: usize| [flat[3 * k], flat[3 * k + 1], flat[3 * k + 2]];
+    let upper = u.cmp_lt(v);
+    let b = V::select(upper, half * u, u - half * v);
+    let c = V::select(upper, v - half * u, half * v);
+    let (corner, e1, e2, normal) = (vector(0), vector(1), vector(2), vector(3));
+    let place: Lanes3<V> = [0, 1, 2].map(|i| c.mul_add(e2[i], b.mul_add(e1[i], corner[i])));
+    let away = sub(place, from);
+    let square = dot(away, away);
+    let dir = scale(away, one / square.sqrt());
+    let cosine = dot(dir, normal);
+    let radiance = choose(cosine.cmp_lt(zero), vector(4), vector(5));
+    let pdf = others.pdf * square / (cosine.abs() * flat[18]);
+    // Seen edge on, or from where it is, it gives nothing.
+    let seen = even & pdf.cmp_lt(V::splat(V::Scalar::INFINITY)) & zero.cmp_lt(pdf);
+    Targets {
+        place: choose(even, place, others.place),
+        near: V::select(even, one, others.near),
+        dir: choose(seen, dir, others.dir),
+        pdf: V::select(seen, pdf, others.pdf),
+        radiance: choose(seen, radiance, others.radiance),
+        is_point: others.is_point,
+    }
+}
+
+/// The set bits of `bits` below `count`.
+#[inline(always)]
+fn lanes_of(bits: u32, count: usize) -> impl Iterator<Item = usize> {
+    let mut bits = bits & ((1u32 << count) - 1);
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros() as usize;
+        (bits != 0).then(|| {
+            bits &= bits - 1;
+            lane
+        })
+    })
 }
 
 /// The next ray of each path of the packet that goes on.
@@ -234,10 +325,7 @@ fn go_on<S: Real, B: Bsdf<S::Wide>>(
     }
     let (org, dir, throughput) = (spill(org), spill(dir), spill(throughput));
     let [pdf, squeeze, _] = spill([sampled.pdf, squeeze, one]);
-    let mut bits = alive.bits() & ((1u32 << path.len()) - 1);
-    while bits != 0 {
-        let lane = bits.trailing_zeros() as usize;
-        bits &= bits - 1;
+    for lane in lanes_of(alive.bits(), path.len()) {
         next.push(path[lane], at(&org, lane), at(&dir, lane), at(&throughput, lane), pdf[lane], squeeze[lane]);
     }
 }

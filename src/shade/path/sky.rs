@@ -5,7 +5,6 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use crate::scene::light::Environment;
-use crate::scene::material::{TextureRef, Wrap};
 
 /// An environment made ready.
 #[derive(Debug)]
@@ -21,15 +20,6 @@ pub struct Sky<'a> {
     brightness: f64,
 }
 
-/// How the picture is looked up.
-const LOOKUP: TextureRef = TextureRef {
-    texture: 0,
-    uv_set: 0,
-    transform: glam::DAffine2::IDENTITY,
-    wrap: [Wrap::Repeat, Wrap::Clamp],
-    nearest: false,
-};
-
 impl<'a> Sky<'a> {
     /// `environment` made ready.
     pub fn new(environment: &'a Environment) -> Self {
@@ -42,11 +32,8 @@ impl<'a> Sky<'a> {
             let weights: Vec<f64> = (0..columns)
                 .map(|column| {
                     let uv = [(column as f64 + 0.5) / columns as f64, (row as f64 + 0.5) / rows as f64];
-                    let color = environment.texture.sample(&LOOKUP, uv);
-                    let light = DVec3::new(color[0].into(), color[1].into(), color[2].into()) * environment.scale;
-                    (light.element_sum() / 3.0).max(0.0) * solid_angle
+                    environment.radiance_at(uv).element_sum() / 3.0 * solid_angle
                 })
-                .map(|w| if w.is_finite() { w } else { 0.0 })
                 .collect();
             let sum: f64 = weights.iter().sum();
             total += sum;
@@ -68,15 +55,7 @@ impl<'a> Sky<'a> {
 
     /// Radiance from direction `dir` (where one looks; need not be unit).
     pub fn radiance(&self, dir: DVec3) -> DVec3 {
-        let color = self.environment.texture.sample(&LOOKUP, self.place(dir));
-        let light = DVec3::new(color[0].into(), color[1].into(), color[2].into()) * self.environment.scale;
-        // A picture may hold anything.
-        if light.is_finite() { light.max(DVec3::ZERO) } else { DVec3::ZERO }
-    }
-
-    fn place(&self, dir: DVec3) -> [f64; 2] {
-        let d = (self.environment.to_world.transpose() * dir).normalize_or(DVec3::NEG_Z);
-        [0.5 + d.x.atan2(-d.z) / TAU, d.y.clamp(-1.0, 1.0).acos() / PI]
+        self.environment.radiance(dir)
     }
 
     /// A direction by brightness, unit, world space, and its density per solid angle.
@@ -100,7 +79,7 @@ impl<'a> Sky<'a> {
         if self.brightness <= 0.0 {
             return 0.0;
         }
-        let [u, v] = self.place(dir);
+        let [u, v] = self.environment.place(dir);
         let cell = |x: f64, count: usize| ((x * count as f64) as usize).min(count - 1);
         self.cell_pdf(cell(v, self.rows), cell(u, self.columns))
     }
@@ -157,15 +136,5 @@ mod tests {
         }
         assert!((area / (4.0 * PI) - 1.0).abs() < 0.01, "densities integrate to one: {area}");
         assert!(((by_light - uniform) / uniform).abs().max_element() < 0.01, "{by_light} {uniform}");
-    }
-
-    #[test]
-    fn the_middle_is_ahead_and_x_to_the_right() {
-        let mut environment = environment();
-        environment.to_world = DMat3::IDENTITY;
-        let sky = Sky::new(&environment);
-        assert_eq!(sky.place(DVec3::NEG_Z), [0.5, 0.5]);
-        assert_eq!(sky.place(DVec3::X * 3.0), [0.75, 0.5]);
-        assert_eq!(sky.place(DVec3::Y)[1], 0.0);
     }
 }

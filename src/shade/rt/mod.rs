@@ -18,7 +18,8 @@ mod shadow;
 
 use glam::DVec3;
 
-use super::shader::{Sample, Shader, Workspace};
+use super::sample::Sample;
+use super::shader::{Shader, Workspace};
 use crate::camera::Camera;
 use crate::lanes::Real;
 use crate::ray::Rays;
@@ -203,7 +204,7 @@ impl<S: Real> Shader<'_, S> {
         for (i, path) in paths.iter().enumerate() {
             batch.set(i, path.org.to_array().map(S::from_f64), path.dir.to_array().map(S::from_f64), start, end);
         }
-        self.intersect(&batch, work);
+        self.intersect_all(&batch, work);
         let found = (0..paths.len()).map(|i| self.rt_found(i, paths[i].org, paths[i].dir, work)).collect();
         work.batch = batch;
         found

@@ -6,7 +6,8 @@ use super::glass::{self, refract};
 use super::material::Finish;
 use super::{AIR, AMBIENT, MAX_BOUNCES, Meeting, Path, Rt, Within};
 use crate::lanes::Real;
-use crate::shade::shader::{Sample, Shader, Workspace};
+use crate::shade::sample::Sample;
+use crate::shade::shader::{Shader, Workspace};
 
 impl<S: Real> Shader<'_, S> {
     /// Lights `meetings`, adds what they show to the pixels and puts mirror and glass rays into `next`.

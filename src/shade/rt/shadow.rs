@@ -62,7 +62,7 @@ impl<S: Real> Shader<'_, S> {
                 batch.set(i, org, dir, S::from_f64(probe.from), S::from_f64(f64::INFINITY));
             }
             work.rays.shadow += probes.len() as u64;
-            self.intersect(&batch, work);
+            self.intersect_all(&batch, work);
             let mut on = Vec::new();
             for (i, probe) in probes.iter().enumerate() {
                 match judge(rt, probe, &self.rt_found(i, probe.org, probe.dir, work)) {

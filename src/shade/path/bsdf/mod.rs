@@ -7,7 +7,7 @@
 mod coat;
 mod conductor;
 mod dielectric;
-mod fresnel;
+pub(in crate::shade) mod fresnel;
 mod ggx;
 mod matte;
 mod metal_rough;
@@ -20,7 +20,6 @@ use crate::lanes::{Lanes, Lanes3};
 pub(super) use coat::{RoughCoat, SmoothCoat};
 pub(super) use conductor::{RoughConductor, SmoothConductor};
 pub(super) use dielectric::{RoughDielectric, SmoothDielectric};
-pub(super) use fresnel::dielectric_mean;
 pub(super) use matte::Matte;
 pub(super) use metal_rough::MetalRough;
 pub(super) use thin::Thin;

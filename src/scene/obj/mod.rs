@@ -1,16 +1,24 @@
-//! Wavefront OBJ: polygons, groups and material names.
+//! Wavefront OBJ: polygons with texture coordinates and normals, groups and material names.
 //!
 //! Source: Alias|Wavefront, "Object Files (.obj)", appendix B1 of the Advanced Visualizer manual, 1995. Read are
-//! `v` (with an optional weight or colour, both ignored), `f` in all four index forms with positive and negative
-//! indices, `g`, `o`, `usemtl` and `mtllib`; `vt`, `vn`, `vp`, `s`, `l` and `p` are passed over; other keywords
-//! (free-form curves among them) are passed over and counted. A face may name vertices that come later in the file.
+//! `v` (with an optional weight or colour, both ignored), `vt` (its first two numbers), `vn`, `f` in all four index
+//! forms with positive and negative indices, `g`, `o`, `usemtl` and `mtllib`; `vp`, `s`, `l` and `p` are passed over;
+//! other keywords (free-form curves among them) are passed over and counted. A face may name vertices that come later
+//! in the file. Indices of `vt` and `vn` that name nothing are counted: such a corner has none.
+//!
+//! `looks` opens the material libraries.
 //!
 //! Memory stays below 64 bytes per byte of the file.
+
+mod attribute;
+mod heights;
+pub mod looks;
 
 use std::path::Path;
 
 use glam::DVec3;
 
+use self::attribute::{Column, NONE};
 use super::mesh::{Mesh, MeshGroup};
 use super::text::{self, Word, Words};
 use crate::error::Result;
@@ -30,6 +38,8 @@ pub struct ObjFile {
     pub material_libs: Vec<String>,
     /// Statements without effect: unknown keywords and faces with fewer than three corners.
     pub ignored: u64,
+    /// Corners whose texture coordinates or normal the file does not have.
+    pub dangling: u64,
 }
 
 /// Reads the bytes of an OBJ file; `file` is only for error messages.
@@ -43,6 +53,8 @@ pub fn parse(file: &Path, bytes: &[u8]) -> Result<ObjFile> {
         out: ObjFile::default(),
         name: String::new(),
         material: String::new(),
+        uvs: Column::default(),
+        normals: Column::default(),
         run_first: 0,
         highest: None,
         unknown: None,
@@ -53,12 +65,22 @@ pub fn parse(file: &Path, bytes: &[u8]) -> Result<ObjFile> {
     reader.finish()
 }
 
+/// Indices of a corner.
+#[derive(Clone, Copy, Default)]
+struct Corner {
+    vertex: u32,
+    uv: u32,
+    normal: u32,
+}
+
 struct Reader<'a> {
     words: Words<'a>,
     out: ObjFile,
     /// Group and material of the faces that follow.
     name: String,
     material: String,
+    uvs: Column<[f32; 2]>,
+    normals: Column<[f32; 3]>,
     /// First triangle of the current run.
     run_first: usize,
     /// The highest 0-based index used before its vertex was there, and where: checked at the end.
@@ -72,13 +94,15 @@ impl<'a> Reader<'a> {
     fn statement(&mut self, keyword: Word<'a>) -> Result<()> {
         match keyword.bytes {
             b"v" => return self.vertex(),
+            b"vt" => return self.coordinates(),
+            b"vn" => return self.normal(),
             b"f" => return self.face(),
             b"g" | b"o" => self.start_run(false),
             b"usemtl" => self.start_run(true),
             b"mtllib" => self.material_lib(),
             // A comment is never continued: a path in it may well end in a backslash.
             [b'#', ..] => _ = self.words.rest_of_line(),
-            b"vt" | b"vn" | b"vp" | b"s" | b"l" | b"p" => self.pass_over(),
+            b"vp" | b"s" | b"l" | b"p" => self.pass_over(),
             _ => {
                 self.out.ignored += 1;
                 self.unknown.get_or_insert(keyword);
@@ -113,17 +137,53 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    /// `vt u v w`: v may be absent, w is not looked at.
+    fn coordinates(&mut self) -> Result<()> {
+        let mut numbers = [0.0; 2];
+        let mut count = 0;
+        while let Some(word) = self.words.next_value() {
+            let number = self.words.number(word)?;
+            if let Some(slot) = numbers.get_mut(count) {
+                *slot = number as f32;
+            }
+            count += 1;
+        }
+        if count == 0 {
+            return Err(self.words.missing("expected the coordinates u and v, found none"));
+        }
+        // A picture's v points down in a mesh, a file's up.
+        self.uvs.values.push([numbers[0], 1.0 - numbers[1]]);
+        Ok(())
+    }
+
+    fn normal(&mut self) -> Result<()> {
+        let mut numbers = [0.0; 3];
+        for i in 0..3 {
+            let Some(word) = self.words.next_value() else {
+                return Err(self.words.missing(format!("expected the 3 numbers of a normal, found {i}")));
+            };
+            numbers[i] = self.words.number(word)? as f32;
+        }
+        self.normals.values.push(numbers);
+        self.pass_over();
+        Ok(())
+    }
+
     fn face(&mut self) -> Result<()> {
-        let (mut first, mut last, mut corners) = (0, 0, 0_usize);
+        let (mut first, mut last, mut corners) = (Corner::default(), Corner::default(), 0_usize);
         while let Some(word) = self.words.next_value() {
             let corner = self.corner(word)?;
             if corners == 0 {
                 first = corner;
             } else if corners >= 2 {
-                if self.out.mesh.triangles.len() >= MAX_COUNT {
+                let number = self.out.mesh.triangles.len();
+                if number >= MAX_COUNT {
                     return Err(self.words.error(word.at, "more than 2^32 - 2 triangles"));
                 }
-                self.out.mesh.triangles.push([first, last, corner]);
+                let triangle = [first, last, corner];
+                self.out.mesh.triangles.push(triangle.map(|c| c.vertex));
+                self.uvs.push(number, triangle.map(|c| c.uv));
+                self.normals.push(number, triangle.map(|c| c.normal));
             }
             last = corner;
             corners += 1;
@@ -132,12 +192,17 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The 0-based vertex index of `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-    fn corner(&mut self, word: Word<'a>) -> Result<u32> {
+    /// The 0-based indices of `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+    fn corner(&mut self, word: Word<'a>) -> Result<Corner> {
         let mut parts = word.bytes.split(|&b| b == b'/');
         let index = parts.next().and_then(text::int);
-        let others_fit = parts.by_ref().take(2).all(|part| part.is_empty() || text::int(part).is_some());
-        let (Some(index), true, None) = (index, others_fit, parts.next()) else {
+        // Absent, or a number.
+        let mut other = || match parts.next() {
+            None | Some(b"") => Some(None),
+            Some(part) => text::int(part).map(Some),
+        };
+        let (uv, normal) = (other(), other());
+        let (Some(index), Some(uv), Some(normal), None) = (index, uv, normal, parts.next()) else {
             let what = format!("expected a vertex index (v, v/vt, v//vn or v/vt/vn), found {}", word.shown());
             return Err(self.words.error(word.at, what));
         };
@@ -154,12 +219,14 @@ impl<'a> Reader<'a> {
         if resolved >= count && self.highest.is_none_or(|(highest, _)| resolved > highest) {
             self.highest = Some((resolved, word.at));
         }
-        Ok(resolved as u32)
+        let uv = uv.map_or(NONE, |index| self.uvs.index(index));
+        let normal = normal.map_or(NONE, |index| self.normals.index(index));
+        Ok(Corner { vertex: resolved as u32, uv, normal })
     }
 
     /// `g`, `o` or `usemtl`: faces from here on are in another run.
     fn start_run(&mut self, is_material: bool) {
-        let text = self.rest_as_name();
+        let text = self.words.rest_as_name();
         let current = if is_material { &self.material } else { &self.name };
         if *current != text {
             self.close_run();
@@ -178,18 +245,6 @@ impl<'a> Reader<'a> {
             });
             self.run_first = end;
         }
-    }
-
-    /// The words up to the end of the line with single spaces between: names may hold blanks and `#`.
-    fn rest_as_name(&mut self) -> String {
-        let mut joined = Vec::new();
-        while let Some(word) = self.words.next_in_line() {
-            if !joined.is_empty() {
-                joined.push(b' ');
-            }
-            joined.extend_from_slice(word.bytes);
-        }
-        text::name(&joined)
     }
 
     /// `mtllib a.mtl b.mtl`: blanks separate libraries, but writers also leave them in file names, so a library
@@ -228,95 +283,12 @@ impl<'a> Reader<'a> {
         {
             self.out.mesh.groups.clear();
         }
+        let (mesh, dangling) = (&mut self.out.mesh, &mut self.out.dangling);
+        mesh.uvs[0] = self.uvs.finish(&mesh.triangles, dangling);
+        mesh.normals = self.normals.finish(&mesh.triangles, dangling);
         Ok(self.out)
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(text: &str) -> ObjFile {
-        parse(Path::new("m.obj"), text.as_bytes()).unwrap()
-    }
-
-    fn first_line_of_error(text: &str) -> String {
-        let error = parse(Path::new("m.obj"), text.as_bytes()).unwrap_err();
-        error.to_string().lines().next().unwrap().to_owned()
-    }
-
-    #[test]
-    fn all_index_forms_name_the_same_triangle() {
-        let vertices = "v 0 0 0\nv 1 0 0 1.0\nv 0 1 0 0.5 0.5 0.5\nvt 0 0\nvn 0 0 1\n";
-        for face in ["f 1 2 3", "f 1/1 2/1 3/1", "f 1//1 2//1 3//1", "f 1/1/1 2/1/1 3/1/1", "f -3 -2/-1 -1/-1/-1"] {
-            let mesh = read(&format!("{vertices}{face}")).mesh;
-            assert_eq!(mesh.positions, [DVec3::ZERO, DVec3::X, DVec3::Y]);
-            assert_eq!(mesh.triangles, [[0, 1, 2]], "{face}");
-            assert_eq!(mesh.groups, []);
-        }
-    }
-
-    #[test]
-    fn polygons_are_fanned_in_place() {
-        let five = "v 0 0 0\nv 1 0 0\nv 2 1 0\nv 1 2 0\nv 0 1 0\n";
-        let mesh = read(&format!("{five}f 3 2 1\nf 1 2 3 4 5\nf 5 4 3\nf 1 2\n")).mesh;
-        assert_eq!(mesh.triangles, [[2, 1, 0], [0, 1, 2], [0, 2, 3], [0, 3, 4], [4, 3, 2]]);
-    }
-
-    #[test]
-    fn line_ends_continuations_comments_and_blanks() {
-        let text =
-            "\u{feff}# C:\\models\\\r\n\r\n  v 0 0 0 # origin\r\nv\t1 0\\\r\n 0\r\nv 0 1 0\\\r\n\r\n#\r\nf 1 2 \\\r\n3";
-        for text in [text.to_owned(), text.replace("\r\n", "\n"), text.replace("\r\n", "\r")] {
-            let out = read(&text);
-            assert_eq!(out.mesh.positions, [DVec3::ZERO, DVec3::X, DVec3::Y]);
-            assert_eq!((out.mesh.triangles.as_slice(), out.ignored), ([[0, 1, 2]].as_slice(), 0));
-        }
-    }
-
-    #[test]
-    fn groups_are_runs_of_name_and_material() {
-        let out = read(
-            "mtllib a.mtl my file.MTL rest\nv 0 0 0\nf 1 1 1\no box\nusemtl Material #25\nf 1 1 1\nf 1 1 1\n\
-             g box\nf 1 1 1\nusemtl red\ng lid  top\nf 1 1 1\ng\n",
-        );
-        let group = |name: &str, material: &str, first, count| MeshGroup {
-            name: name.into(),
-            material: material.into(),
-            first,
-            count,
-        };
-        let expected = [group("", "", 0, 1), group("box", "Material #25", 1, 3), group("lid top", "red", 4, 1)];
-        assert_eq!(out.mesh.groups, expected);
-        assert_eq!(out.material_libs, ["a.mtl", "my file.MTL", "rest"]);
-    }
-
-    #[test]
-    fn odd_but_valid() {
-        assert_eq!(read(""), ObjFile::default());
-        let out = read("f 2 3 1\nv nan -inf 1e400\nv .5 +5. 1E-3\nv 0 0 0\nl 1 2\np 1\ncurv 0 1 \\\n 2\nsurf\nf 1 2\n");
-        assert_eq!(out.mesh.triangles, [[1, 2, 0]], "faces may come before their vertices");
-        assert!(out.mesh.positions[0].x.is_nan());
-        assert_eq!(out.mesh.positions[0].y, f64::NEG_INFINITY);
-        assert_eq!(out.mesh.positions[1], DVec3::new(0.5, 5.0, 1e-3));
-        assert_eq!(out.ignored, 3, "curv, surf and a face of two corners");
-    }
-
-    #[test]
-    fn errors_say_where() {
-        for (text, expected) in [
-            ("v 0 0 0\nv 0 x1 0", "m.obj:2:5: expected a number, found `x1`"),
-            ("v 0 0\n", "m.obj:1:6: expected the 3 coordinates of a vertex, found 2"),
-            ("v 0 0 0 0 0 0 0 0", "m.obj:1:17: expected the end of the line: a vertex has at most 7 numbers"),
-            ("v 0 0 0\nf 1 1 0", "m.obj:2:7: vertex index 0 names no vertex: 1 are defined up to here"),
-            ("v 0 0 0\nf -2 1 1", "m.obj:2:3: vertex index -2 names no vertex: 1 are defined up to here"),
-            ("v 0 0 0\n\n f 1 1 2", "m.obj:3:8: vertex index 2 names no vertex: the file has 1"),
-            ("f 1 1 99999999999", "m.obj:1:7: vertex index 99999999999 names no vertex: 0 are defined up to here"),
-            ("f 1/2/3/4", "m.obj:1:3: expected a vertex index (v, v/vt, v//vn or v/vt/vn), found `1/2/3/4`"),
-            ("f 1/x", "m.obj:1:3: expected a vertex index (v, v/vt, v//vn or v/vt/vn), found `1/x`"),
-            ("\nsolid x", "m.obj:2:1: expected an OBJ statement such as `v` or `f`, found `solid`"),
-        ] {
-            assert_eq!(first_line_of_error(text), expected);
-        }
-    }
-}
+mod tests;

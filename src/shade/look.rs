@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::bsdf::dielectric_mean;
+use super::path::fresnel::dielectric_mean;
 use crate::scene::description::{Description, Material};
 use crate::scene::material::{Alpha, Scattering, TextureRef};
 use crate::scene::texture::Texture;
@@ -75,6 +75,8 @@ struct Ready {
     back: Look,
     /// Whether a texture changes the look.
     is_textured: bool,
+    /// Whether all points of it look the same from both sides and shine not.
+    is_uniform: bool,
 }
 
 /// The materials of a scene made ready.
@@ -86,15 +88,21 @@ pub struct Looks<'a> {
     pub has_holes: bool,
     /// Whether some material is a mixture.
     pub has_mixtures: bool,
+    /// Whether some material is glass ([`Self::is_glass`]).
+    pub has_glass: bool,
 }
 
 impl<'a> Looks<'a> {
     /// Those of `description`; a number beyond the list means the default material.
     pub fn new(description: &'a Description) -> Self {
-        let materials: Vec<_> = description.materials.iter().map(|m| (m.clone(), Ready::new(m))).collect();
+        let mut materials: Vec<_> = description.materials.iter().map(|m| (m.clone(), Ready::new(m))).collect();
+        if materials.is_empty() {
+            materials.push((Material::default(), Ready::new(&Material::default())));
+        }
         let has_holes = materials.iter().any(|(m, _)| m.alpha != Alpha::Opaque);
         let has_mixtures = materials.iter().any(|(m, _)| matches!(m.scattering, Scattering::Mix { .. }));
-        Self { materials, textures: &description.textures, has_holes, has_mixtures }
+        let has_glass = materials.iter().any(|(m, _)| lets_pass(m));
+        Self { materials, textures: &description.textures, has_holes, has_mixtures, has_glass }
     }
 
     /// Material number `id`.
@@ -117,6 +125,14 @@ impl<'a> Looks<'a> {
                 if choice < amount { (second, choice / amount) } else { (first, (choice - amount) / (1.0 - amount)) };
         }
         id
+    }
+
+    /// What every point of material `id` scatters with, if that is the same everywhere and from both sides, none
+    /// shines, and no normal map bends the surface.
+    #[inline]
+    pub fn uniform(&self, id: u32) -> Option<&Look> {
+        let ready = &self.entry(id).1;
+        ready.is_uniform.then_some(&ready.front)
     }
 
     /// What material `id` (no mixture) scatters with at `surface`; `from_front`: seen from the side of its normal.
@@ -158,6 +174,18 @@ impl<'a> Looks<'a> {
         self.material(id).alpha != Alpha::Opaque
     }
 
+    /// Whether material `id` is a pane or a body of glass, or has some of it.
+    pub fn is_glass(&self, id: u32) -> bool {
+        lets_pass(self.material(id))
+    }
+
+    /// Share of ambient light that reaches material `id` at `surface`.
+    pub fn ambient(&self, id: u32, surface: &Surface<'_>) -> f64 {
+        let textures = &self.material(id).textures;
+        let open = self.sample(textures.occlusion.as_ref(), surface).map_or(1.0, |c| f64::from(c[0]));
+        1.0 + (open - 1.0) * textures.occlusion_strength
+    }
+
     /// Share of light that material `id` stops at `surface`.
     pub fn opacity(&self, id: u32, surface: &Surface) -> f64 {
         let material = self.material(id);
@@ -193,6 +221,14 @@ impl<'a> Looks<'a> {
     }
 }
 
+fn lets_pass(material: &Material) -> bool {
+    match material.scattering {
+        Scattering::Dielectric { .. } | Scattering::ThinGlass { .. } => true,
+        Scattering::MetallicRoughness { transmission, .. } => transmission > 0.0,
+        _ => false,
+    }
+}
+
 fn rgb(color: [f32; 4]) -> DVec3 {
     DVec3::new(f64::from(color[0]), f64::from(color[1]), f64::from(color[2]))
 }
@@ -201,7 +237,14 @@ impl Ready {
     fn new(material: &Material) -> Self {
         let t = &material.textures;
         let is_textured = t.base.is_some() || t.metallic_roughness.is_some() || t.transmission.is_some();
-        Self { front: constant(material, true), back: constant(material, false), is_textured }
+        let is_uniform = !is_textured
+            && t.normal.is_none()
+            && material.emission == DVec3::ZERO
+            && matches!(
+                material.scattering,
+                Scattering::Matte | Scattering::Plastic { .. } | Scattering::MetallicRoughness { .. }
+            );
+        Self { front: constant(material, true), back: constant(material, false), is_textured, is_uniform }
     }
 }
 

@@ -1,0 +1,56 @@
+//! Picture files that a scene file names.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::meshes::MeshFiles;
+use super::source::{Source, Span};
+use crate::error::Result;
+use crate::scene::material::TextureId;
+use crate::scene::pictures::{Content, Curve, Picture, decode_all};
+use crate::scene::text;
+use crate::scene::texture::Texture;
+
+/// Pictures met so far, to be decoded together.
+pub struct Images<'f> {
+    files: &'f MeshFiles<'f>,
+    list: Vec<Picture<'static>>,
+    spans: Vec<Span>,
+    known: HashMap<(PathBuf, Curve), TextureId>,
+}
+
+impl<'f> Images<'f> {
+    /// None yet; `files` leads to them.
+    pub fn new(files: &'f MeshFiles<'f>) -> Self {
+        Self { files, list: Vec::new(), spans: Vec::new(), known: HashMap::new() }
+    }
+
+    /// The number of the texture that `written`, at `span`, will be.
+    ///
+    /// # Errors
+    /// A file that does not exist or may not be used.
+    pub fn add(&mut self, source: Source<'_>, written: &str, span: Span, curve: Curve) -> Result<TextureId> {
+        let path = self.files.resolve(written).map_err(|what| source.error(span, what))?;
+        if let Some(&known) = self.known.get(&(path.clone(), curve)) {
+            return Ok(known);
+        }
+        let id = self.list.len() as TextureId;
+        self.list.push(Picture { name: text::name(written.as_bytes()), content: Content::File(path.clone()), curve });
+        self.spans.push(span);
+        self.known.insert((path, curve), id);
+        Ok(id)
+    }
+
+    /// The textures by their numbers, and the SHA-256 of each picture.
+    ///
+    /// # Errors
+    /// The first picture that cannot be read, where the scene names it.
+    pub fn decode(self, source: Source<'_>) -> Result<(Vec<Arc<Texture>>, Vec<[u8; 32]>)> {
+        let all = decode_all(&self.list).map_err(|wrong| {
+            let name = text::shown(self.list[wrong.index].name.as_bytes());
+            source.error(self.spans[wrong.index], format!("{name}: {}", wrong.what))
+        })?;
+        Ok(all.into_iter().map(|(texture, digest)| (Arc::new(texture), digest)).unzip())
+    }
+}

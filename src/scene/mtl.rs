@@ -1,0 +1,371 @@
+//! Wavefront MTL: the material libraries of OBJ files.
+//!
+//! Source: Alias|Wavefront, "MTL material format", 1995, and the PBR extension (Pr, Pm, norm) that exporters write
+//! (Clara.io, 2014). Read are `newmtl`, `Kd`, `Ks`, `Ke`, `Tf`, `Ns`, `Ni`, `d`, `Tr`, `illum`, `Pr`, `Pm`, and the maps
+//! `map_Kd`, `map_Ke`, `map_d`, `map_Bump` (or `bump`) and `norm` with their options -s, -o, -clamp and -bm; keywords
+//! in any case. What the model cannot use is passed over and counted: ambient colours, spectral files, other maps.
+//!
+//! What a material becomes ([`Entry::material`]): with Pr or Pm the metallic-roughness model; with illum 6 or 7 solid
+//! glass of index Ni; with illum 3, 5 or 8 matte with a mirror of Ks; with a Ks above 0, unless illum is 0 or 1, a coat
+//! on a diffuse base; else matte. Ns becomes the roughness with the same width of highlight: alpha^2 = 2 / (Ns + 2)
+//! (B. Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007, section 5.1).
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::material::{Alpha, Material, Scattering};
+use super::text::{Word, Words};
+use crate::error::Result;
+
+/// Index of refraction where a file has none above 1.
+const IOR: f64 = 1.5;
+/// Largest library, bytes; in memory it takes less than 128 times as much.
+pub const MAX_BYTES: u64 = 8 << 20;
+/// Longest name of a map, bytes; paths have fewer.
+const MAX_PATH: usize = 4096;
+
+/// What a library holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Library {
+    /// Materials in their order.
+    pub entries: Vec<Entry>,
+    /// Statements and options that are not read.
+    pub ignored: u64,
+}
+
+/// One material as written.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Entry {
+    /// Name, cut to 255 bytes.
+    pub name: String,
+    diffuse: Option<DVec3>,
+    specular: DVec3,
+    emission: DVec3,
+    filter: Option<DVec3>,
+    exponent: Option<f64>,
+    ior: Option<f64>,
+    opacity: Option<f64>,
+    transparency: Option<f64>,
+    illumination: Option<i64>,
+    roughness: Option<f64>,
+    metallic: Option<f64>,
+    /// Base colour.
+    pub base_map: Option<Box<Map>>,
+    /// Emitted radiance.
+    pub emission_map: Option<Box<Map>>,
+    /// Opacity.
+    pub opacity_map: Option<Box<Map>>,
+    /// Heights, or normals as many files have there.
+    pub bump_map: Option<Box<Map>>,
+    /// Normals.
+    pub normal_map: Option<Box<Map>>,
+}
+
+/// A map as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Map {
+    /// The file's name as written.
+    pub file: String,
+    /// -s: factors of u and v.
+    pub scale: [f64; 2],
+    /// -o: added to u and v after that.
+    pub offset: [f64; 2],
+    /// -clamp on: the outermost texels beyond the edges.
+    pub clamp: bool,
+    /// -bm: factor of heights, and of the x and y of normals.
+    pub multiplier: f64,
+}
+
+impl Entry {
+    /// The material, without textures.
+    pub fn material(&self) -> Material {
+        let mut diffuse = self.diffuse.unwrap_or(DVec3::splat(0.8)).clamp(DVec3::ZERO, DVec3::ONE);
+        if self.base_map.is_some() && diffuse == DVec3::ZERO {
+            // Exporters leave the factor of a map at zero; nobody means a black picture.
+            diffuse = DVec3::ONE;
+        }
+        let specular = self.specular.clamp(DVec3::ZERO, DVec3::ONE);
+        let ior = self.ior.filter(|&ior| ior > 1.0).unwrap_or(IOR);
+        let from_exponent = |absent: f64| self.exponent.map_or(absent, |n| (2.0 / (n.max(0.0) + 2.0)).powf(0.25));
+        let mut material = Material { name: self.name.clone(), diffuse, ..Material::default() };
+        material.emission = self.emission.max(DVec3::ZERO);
+        let is_glass = matches!(self.illumination, Some(6 | 7)) && self.opacity_map.is_none();
+        if self.roughness.is_some() || self.metallic.is_some() {
+            let roughness = self.roughness.unwrap_or_else(|| from_exponent(0.5)).clamp(0.0, 1.0);
+            let metallic = self.metallic.unwrap_or(0.0).clamp(0.0, 1.0);
+            let transmission = f64::from(u8::from(is_glass));
+            material.scattering = Scattering::MetallicRoughness { metallic, roughness, ior, transmission };
+        } else if is_glass {
+            let tint = self.filter.unwrap_or(DVec3::ONE).clamp(DVec3::ZERO, DVec3::ONE);
+            material.scattering =
+                Scattering::Dielectric { ior: self.ior.unwrap_or(IOR).max(1.0), roughness: 0.0, tint };
+        } else if matches!(self.illumination, Some(3 | 5 | 8)) {
+            material.mirror = specular;
+            material.diffuse = diffuse.min(DVec3::ONE - specular);
+        } else if specular != DVec3::ZERO && !matches!(self.illumination, Some(0 | 1)) {
+            material.scattering = Scattering::Plastic { ior, roughness: from_exponent(0.5) };
+        }
+        if !is_glass {
+            // Where both are given they often contradict each other; `d` is the one that the format defines.
+            material.opacity = self.opacity.or(self.transparency.map(|t| 1.0 - t)).unwrap_or(1.0).clamp(0.0, 1.0);
+            if material.opacity < 1.0 || self.opacity_map.is_some() {
+                material.alpha = Alpha::Blend;
+            }
+        }
+        material
+    }
+}
+
+/// Reads the bytes of a library; `file` is only for error messages.
+///
+/// # Errors
+/// At line and column: a word that is not a finite number where one must be, a missing number, name or file, a
+/// property before the first `newmtl`.
+pub fn parse(file: &Path, bytes: &[u8]) -> Result<Library> {
+    let mut reader = Reader { words: Words::new(file, bytes, 0), out: Library::default() };
+    while let Some(keyword) = reader.words.next() {
+        reader.statement(keyword)?;
+    }
+    Ok(reader.out)
+}
+
+struct Reader<'a> {
+    words: Words<'a>,
+    out: Library,
+}
+
+impl<'a> Reader<'a> {
+    /// Reads one statement up to the end of its line.
+    fn statement(&mut self, keyword: Word<'_>) -> Result<()> {
+        if keyword.bytes[0] == b'#' {
+            self.words.rest_of_line();
+            return Ok(());
+        }
+        let name = keyword.bytes.to_ascii_lowercase();
+        if name == b"newmtl" {
+            let name = self.words.rest_as_name();
+            if name.is_empty() {
+                return Err(self.words.missing("expected the material's name"));
+            }
+            self.out.entries.push(Entry { name, ..Entry::default() });
+            return Ok(());
+        }
+        match name.as_slice() {
+            b"kd" => self.colour(keyword, |e, c| e.diffuse = Some(c)),
+            b"ks" => self.colour(keyword, |e, c| e.specular = c),
+            b"ke" => self.colour(keyword, |e, c| e.emission = c),
+            b"tf" => self.colour(keyword, |e, c| e.filter = Some(c)),
+            b"ns" => self.number(keyword, |e, x| e.exponent = Some(x)),
+            b"ni" => self.number(keyword, |e, x| e.ior = Some(x)),
+            b"d" => self.number(keyword, |e, x| e.opacity = Some(x)),
+            b"tr" => self.number(keyword, |e, x| e.transparency = Some(x)),
+            b"illum" => self.number(keyword, |e, x| e.illumination = Some(x as i64)),
+            b"pr" => self.number(keyword, |e, x| e.roughness = Some(x)),
+            b"pm" => self.number(keyword, |e, x| e.metallic = Some(x)),
+            b"map_kd" => self.map(keyword, |e, m| e.base_map = Some(Box::new(m))),
+            b"map_ke" => self.map(keyword, |e, m| e.emission_map = Some(Box::new(m))),
+            b"map_d" => self.map(keyword, |e, m| e.opacity_map = Some(Box::new(m))),
+            b"map_bump" | b"bump" => self.map(keyword, |e, m| e.bump_map = Some(Box::new(m))),
+            b"norm" | b"map_norm" => self.map(keyword, |e, m| e.normal_map = Some(Box::new(m))),
+            _ => {
+                self.out.ignored += 1;
+                self.words.rest_of_line();
+                Ok(())
+            }
+        }
+    }
+
+    /// The material that the statement `keyword` belongs to.
+    fn entry(&mut self, keyword: Word<'_>) -> Result<&mut Entry> {
+        let help = "a material library is a list of materials, each begun by `newmtl`";
+        let what = format!("expected `newmtl` and a name before {}", keyword.shown());
+        let error = self.words.error(keyword.at, what).with_help(help);
+        self.out.entries.last_mut().ok_or(error)
+    }
+
+    /// A finite number of this line.
+    fn finite(&self, word: Word<'_>) -> Result<f64> {
+        let number = self.words.number(word)?;
+        match number.is_finite() {
+            true => Ok(number),
+            false => Err(self.words.error(word.at, format!("expected a finite number, found {}", word.shown()))),
+        }
+    }
+
+    fn number(&mut self, keyword: Word<'_>, set: impl FnOnce(&mut Entry, f64)) -> Result<()> {
+        let mut word = self.words.next_value();
+        // `d -halo 0.5` fades towards the edges of a body; only the number is read.
+        while word.is_some_and(|w| w.bytes == b"-halo") {
+            self.out.ignored += 1;
+            word = self.words.next_value();
+        }
+        let Some(word) = word else { return Err(self.words.missing("expected a number")) };
+        let number = self.finite(word)?;
+        self.words.rest_of_line();
+        set(self.entry(keyword)?, number);
+        Ok(())
+    }
+
+    /// One number (grey) or three.
+    fn colour(&mut self, keyword: Word<'_>, set: impl FnOnce(&mut Entry, DVec3)) -> Result<()> {
+        let mut numbers = [0.0; 3];
+        let mut count = 0;
+        while let Some(word) = self.words.next_value() {
+            if count == 0 && matches!(word.bytes, b"spectral" | b"xyz") {
+                self.out.ignored += 1;
+                self.words.rest_of_line();
+                return Ok(());
+            }
+            if count == 3 {
+                return Err(self.words.error(word.at, "expected the end of the line: a colour has three numbers"));
+            }
+            numbers[count] = self.finite(word)?;
+            count += 1;
+        }
+        let colour = match count {
+            1 => DVec3::splat(numbers[0]),
+            3 => DVec3::from_array(numbers),
+            _ => return Err(self.words.missing(format!("expected one number or three, found {count}"))),
+        };
+        set(self.entry(keyword)?, colour);
+        Ok(())
+    }
+
+    /// Options, then the file's name up to the end of the line.
+    fn map(&mut self, keyword: Word<'_>, set: impl FnOnce(&mut Entry, Map)) -> Result<()> {
+        let mut map = Map { file: String::new(), scale: [1.0; 2], offset: [0.0; 2], clamp: false, multiplier: 1.0 };
+        let mut pending = self.words.next_in_line();
+        while let Some(option) = pending.filter(|w| w.bytes[0] == b'-') {
+            match option.bytes {
+                b"-s" => (map.scale, pending) = self.vector(1.0)?,
+                b"-o" => (map.offset, pending) = self.vector(0.0)?,
+                b"-t" => (_, pending) = self.vector(0.0)?,
+                b"-bm" | b"-boost" | b"-texres" => {
+                    let Some(word) = self.words.next_in_line() else {
+                        return Err(self.words.missing(format!("expected a number after {}", option.shown())));
+                    };
+                    let number = self.finite(word)?;
+                    map.multiplier = if option.bytes == b"-bm" { number } else { map.multiplier };
+                    pending = self.words.next_in_line();
+                }
+                b"-mm" => {
+                    (_, pending) = self.vector(0.0)?;
+                    self.out.ignored += 1;
+                }
+                b"-clamp" | b"-blendu" | b"-blendv" | b"-cc" | b"-imfchan" | b"-type" => {
+                    let value = self.words.next_in_line();
+                    if option.bytes == b"-clamp" {
+                        map.clamp = value.is_some_and(|w| w.bytes == b"on");
+                    } else {
+                        self.out.ignored += 1;
+                    }
+                    pending = self.words.next_in_line();
+                }
+                _ => break,
+            }
+        }
+        let Some(first) = pending else { return Err(self.words.missing("expected the name of a file")) };
+        let rest = self.words.rest_of_line();
+        let gap = if rest.is_empty() { "" } else { " " };
+        let name = [first.bytes, gap.as_bytes(), rest].concat();
+        if name.len() > MAX_PATH {
+            return Err(self.words.error(first.at, format!("the file's name is longer than {MAX_PATH} bytes")));
+        }
+        map.file = String::from_utf8_lossy(&name).into_owned();
+        set(self.entry(keyword)?, map);
+        Ok(())
+    }
+
+    /// One to three numbers, the first two of them (`absent` for the second if there is one), and the word after them.
+    fn vector(&mut self, absent: f64) -> Result<([f64; 2], Option<Word<'a>>)> {
+        let Some(first) = self.words.next_in_line() else { return Err(self.words.missing("expected a number")) };
+        let mut vector = [self.finite(first)?, absent];
+        for i in 1..4 {
+            let word = self.words.next_in_line();
+            match word.and_then(|w| w.float::<f64>()).filter(|x| i < 3 && x.is_finite()) {
+                Some(number) if i == 1 => vector[1] = number,
+                Some(_) => {}
+                None => return Ok((vector, word)),
+            }
+        }
+        Ok((vector, None))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Library {
+        parse(Path::new("m.mtl"), text.as_bytes()).unwrap()
+    }
+
+    fn material(text: &str) -> Material {
+        read(&format!("newmtl m\n{text}")).entries[0].material()
+    }
+
+    #[test]
+    fn models_of_illumination() {
+        let plain = material("Kd 0.5 0.25 1");
+        assert_eq!((plain.diffuse, plain.scattering), (DVec3::new(0.5, 0.25, 1.0), Scattering::Matte));
+        let coat = material("illum 2\nKs 0.5\nNs 30\nNi 1.3");
+        assert_eq!(coat.scattering, Scattering::Plastic { ior: 1.3, roughness: 0.5 }, "alpha^2 is 2 / 32, alpha 1 / 4");
+        assert_eq!(material("illum 1\nKs 1 1 1\nNs 9").scattering, Scattering::Matte);
+        let mirror = material("illum 3\nKd 0.9\nKs 0.25 0.5 0");
+        assert_eq!((mirror.mirror, mirror.diffuse), (DVec3::new(0.25, 0.5, 0.0), DVec3::new(0.75, 0.5, 0.9)));
+        let glass = material("illum 7\nNi 1.52\nTf 0.9 1 0.9\nd 0.1");
+        let tint = DVec3::new(0.9, 1.0, 0.9);
+        assert_eq!(glass.scattering, Scattering::Dielectric { ior: 1.52, roughness: 0.0, tint });
+        assert_eq!((glass.alpha, glass.opacity), (Alpha::Opaque, 1.0));
+        let pbr = material("Pr 0.25\nPm 1\nillum 2\nKs 1");
+        let expected = Scattering::MetallicRoughness { metallic: 1.0, roughness: 0.25, ior: 1.5, transmission: 0.0 };
+        assert_eq!(pbr.scattering, expected);
+        assert_eq!(material("Ke 4 2 1").emission, DVec3::new(4.0, 2.0, 1.0));
+        for (text, opacity) in
+            [("d 0.5", 0.5), ("Tr 0.25", 0.75), ("d 1\nTr 1", 1.0), ("d -halo 0.5", 0.5), ("d 7", 1.0)]
+        {
+            let m = material(text);
+            assert_eq!((m.opacity, m.alpha == Alpha::Blend), (opacity, opacity < 1.0), "{text}");
+        }
+        assert_eq!(material("map_d a.png").alpha, Alpha::Blend);
+        assert_eq!(material("Kd 0 0 0\nmap_Kd a.png").diffuse, DVec3::ONE);
+    }
+
+    #[test]
+    fn maps_have_options_and_names_with_blanks() {
+        let library = read(
+            "# head\nnewmtl a b #1\nMAP_KD -s 2 3 1 -o 0.5 -clamp on my picture.png\nbump -bm 0.3 -imfchan l h.png\n\
+             norm -s 2 n.png\nmap_d 7.png\nmap_Ke -mm 0 1 -t 1 e.png # no comment\n\nnewmtl c\nmap_Ks s.png\nKa 1 1 1",
+        );
+        let map =
+            |file: &str| Map { file: file.into(), scale: [1.0; 2], offset: [0.0; 2], clamp: false, multiplier: 1.0 };
+        let first = &library.entries[0];
+        assert_eq!((library.entries.len(), first.name.as_str(), library.ignored), (2, "a b #1", 4));
+        let base = Map { scale: [2.0, 3.0], offset: [0.5, 0.0], clamp: true, ..map("my picture.png") };
+        assert_eq!(first.base_map.as_deref(), Some(&base));
+        assert_eq!(first.bump_map.as_deref(), Some(&Map { multiplier: 0.3, ..map("h.png") }));
+        assert_eq!(first.normal_map.as_deref(), Some(&Map { scale: [2.0, 1.0], ..map("n.png") }));
+        assert_eq!(first.opacity_map.as_deref(), Some(&map("7.png")));
+        assert_eq!(first.emission_map.as_deref(), Some(&map("e.png # no comment")));
+        assert_eq!(read(""), Library::default());
+    }
+
+    #[test]
+    fn errors_say_where() {
+        for (text, expected) in [
+            ("\nKd 1 1 1", "m.mtl:2:1: expected `newmtl` and a name before `Kd`"),
+            ("newmtl", "m.mtl:1:7: expected the material's name"),
+            ("newmtl a\nKd 1 x 1", "m.mtl:2:6: expected a number, found `x`"),
+            ("newmtl a\nKd 1 2", "m.mtl:2:7: expected one number or three, found 2"),
+            ("newmtl a\nKd 1 2 3 4", "m.mtl:2:10: expected the end of the line: a colour has three numbers"),
+            ("newmtl a\nNs inf", "m.mtl:2:4: expected a finite number, found `inf`"),
+            ("newmtl a\nNi", "m.mtl:2:3: expected a number"),
+            ("newmtl a\nmap_Kd -s 1 1", "m.mtl:2:14: expected the name of a file"),
+            ("newmtl a\nmap_Kd -bm", "m.mtl:2:11: expected a number after `-bm`"),
+        ] {
+            let error = parse(Path::new("m.mtl"), text.as_bytes()).unwrap_err().to_string();
+            assert_eq!(error.lines().next().unwrap(), expected, "{text}");
+        }
+    }
+}

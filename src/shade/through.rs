@@ -1,0 +1,176 @@
+//! Closest hits and shadow rays in scenes where surfaces let rays pass: by their opacity, or as panes and bodies of
+//! glass.
+
+use glam::DVec3;
+
+use super::classic::Classic;
+use super::look::Looks;
+use crate::camera::sampling::pcg4d;
+use crate::camera::sobol::PixelPoints;
+use crate::lanes::Real;
+use crate::ray::{Counters, Hits, INVALID_ID, Rays};
+use crate::scene::world::World;
+use crate::trace::{Engine, Scratch};
+
+/// Surfaces that a ray may pass; what lies behind more of them is not seen.
+const MOST_LAYERS: u32 = 1024;
+/// Name of the number that chooses in mixtures; layers that a ray meets are named by their number.
+pub(super) const MIXTURE: u32 = u32::MAX;
+
+/// A number in [0, 1) of a pixel's sample and bounce, by name.
+pub(super) fn number(pixel: PixelPoints, sample: u32, bounce: u32, name: u32) -> f64 {
+    let [bits, ..] = pcg4d([pixel.bits(0, u32::MAX)[0], sample, bounce, name]);
+    f64::from(bits) / 4_294_967_296.0
+}
+
+/// A tracer of rays that pass some surfaces.
+#[derive(Clone, Copy)]
+pub(super) struct Through<'a, S: Real> {
+    pub world: &'a World<S>,
+    pub engine: &'a dyn Engine<S>,
+    pub looks: &'a Looks<'a>,
+}
+
+/// Rays on their way through layers.
+#[derive(Debug)]
+pub(super) struct Again<S> {
+    rays: Rays<S>,
+    hits: Hits<S>,
+    /// Which ray of the batch each is.
+    index: Vec<u32>,
+    /// What of each ray's light is left.
+    left: Vec<DVec3>,
+}
+
+impl<S: Real> Default for Again<S> {
+    fn default() -> Self {
+        Self { rays: Rays::new(0), hits: Hits::new(0), index: Vec::new(), left: Vec::new() }
+    }
+}
+
+impl<S: Real> Through<'_, S> {
+    /// Closest hits of `rays` into `hits`; what opacity lets pass is no hit. `number` gives the number in [0, 1) that
+    /// decides for ray `i` at its layer `k`.
+    pub fn closest(
+        &self,
+        rays: &Rays<S>,
+        hits: &mut Hits<S>,
+        scratch: &mut Scratch,
+        again: &mut Again<S>,
+        mut counters: Option<&mut Counters>,
+        number: impl Fn(usize, u32) -> f64,
+    ) {
+        self.engine.intersect(self.world, rays, hits, scratch, counters.as_deref_mut());
+        if !self.looks.has_holes {
+            return;
+        }
+        let Again { rays: behind, hits: found, index, .. } = again;
+        index.clear();
+        index.extend(0..rays.len() as u32);
+        for layer in 0..MOST_LAYERS {
+            index.retain(|&i| {
+                let opacity = self.opacity(rays, hits, i as usize);
+                opacity < 1.0 && number(i as usize, layer) >= opacity
+            });
+            if index.is_empty() {
+                return;
+            }
+            go_behind(rays, hits, index, behind);
+            self.engine.intersect(self.world, behind, found, scratch, counters.as_deref_mut());
+            index.iter().enumerate().for_each(|(k, &i)| copy(found, k, hits, i as usize));
+        }
+    }
+
+    /// What of the light along each of `rays` is left, as a list: 0 behind an opaque surface, 1 without any in
+    /// between. With `glass`, panes and bodies of glass let light pass straight on, weakened by their tint and
+    /// Fresnel's term; else they stop it.
+    pub fn shadows<'m>(
+        &self,
+        rays: &Rays<S>,
+        hits: &mut Hits<S>,
+        occluded: &mut Vec<u8>,
+        scratch: &mut Scratch,
+        again: &'m mut Again<S>,
+        glass: bool,
+        mut counters: Option<&mut Counters>,
+    ) -> &'m [DVec3] {
+        let Again { rays: behind, hits: found, index, left } = again;
+        left.clear();
+        if !(self.looks.has_holes || glass && self.looks.has_glass) {
+            self.engine.occluded(self.world, rays, occluded, scratch, counters);
+            left.extend(occluded.iter().map(|&o| DVec3::splat(f64::from(1 - o.min(1)))));
+            return left;
+        }
+        left.resize(rays.len(), DVec3::ONE);
+        self.engine.intersect(self.world, rays, hits, scratch, counters.as_deref_mut());
+        index.clear();
+        index.extend(0..rays.len() as u32);
+        for _ in 0..MOST_LAYERS {
+            index.retain(|&i| {
+                let i = i as usize;
+                if hits.is_hit(i) {
+                    left[i] *= self.passed(rays, hits, i, glass);
+                }
+                hits.is_hit(i) && left[i] != DVec3::ZERO
+            });
+            if index.is_empty() {
+                break;
+            }
+            go_behind(rays, hits, index, behind);
+            self.engine.intersect(self.world, behind, found, scratch, counters.as_deref_mut());
+            index.iter().enumerate().for_each(|(k, &i)| copy(found, k, hits, i as usize));
+        }
+        // What is still inside after so many layers is dark.
+        index.iter().for_each(|&i| left[i as usize] = DVec3::ZERO);
+        left
+    }
+
+    /// Share of light that the surface hit by ray `i` stops; 1 for a miss.
+    fn opacity(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize) -> f64 {
+        if !hits.is_hit(i) {
+            return 1.0;
+        }
+        let (prim, inst) = (hits.prim[i], hits.inst[i]);
+        let material = self.world.material(self.world.assembly.placements[inst as usize].object, prim);
+        if !self.looks.is_holed(material) {
+            return 1.0;
+        }
+        let (org, dir, [t, u, v]) = numbers(rays, hits, i);
+        self.looks.opacity(material, &self.world.surface(org, dir, t, u, v, prim, inst))
+    }
+
+    /// Share of light that passes the surface hit by ray `i`.
+    fn passed(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize, glass: bool) -> DVec3 {
+        let (prim, inst) = (hits.prim[i], hits.inst[i]);
+        let material = self.world.material(self.world.assembly.placements[inst as usize].object, prim);
+        let is_glass = glass && self.looks.is_glass(material);
+        if !is_glass && !self.looks.is_holed(material) {
+            return DVec3::ZERO;
+        }
+        let (org, dir, [t, u, v]) = numbers(rays, hits, i);
+        let surface = self.world.surface(org, dir, t, u, v, prim, inst);
+        let opacity = self.looks.opacity(material, &surface);
+        let through = if is_glass { Classic::of(self.looks, &surface, dir).through } else { DVec3::ZERO };
+        DVec3::splat(1.0 - opacity) + through * opacity
+    }
+}
+
+fn numbers<S: Real>(rays: &Rays<S>, hits: &Hits<S>, i: usize) -> (DVec3, DVec3, [f64; 3]) {
+    let [org, dir] = [rays.org(i), rays.dir(i)].map(|v| DVec3::from(v.map(S::to_f64)));
+    (org, dir, [hits.t[i], hits.u[i], hits.v[i]].map(S::to_f64))
+}
+
+/// The rays `index` of `rays` from behind their hits, into `behind`.
+fn go_behind<S: Real>(rays: &Rays<S>, hits: &Hits<S>, index: &[u32], behind: &mut Rays<S>) {
+    behind.reset(index.len());
+    for (k, &i) in index.iter().enumerate() {
+        let i = i as usize;
+        behind.set(k, rays.org(i), rays.dir(i), hits.t[i].next_up(), rays.t_max[i]);
+    }
+}
+
+fn copy<S: Real>(from: &Hits<S>, k: usize, to: &mut Hits<S>, i: usize) {
+    (to.t[i], to.u[i], to.v[i]) = (from.t[k], from.u[k], from.v[k]);
+    (to.prim[i], to.inst[i]) = (from.prim[k], from.inst[k]);
+    debug_assert!(from.is_hit(k) || to.prim[i] == INVALID_ID);
+}
