@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::{
     Bsdf, Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric,
-    Thin, dielectric_mean,
+    Thin, fresnel::dielectric_mean,
 };
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
@@ -27,9 +27,9 @@ fn packet<S: Real>(list: &[Params]) -> Points<S> {
         let mut fields = [S::ZERO; FIELDS];
         (0..3).for_each(|i| fields[BASE + i] = S::from_f64(base[i]));
         (0..7).for_each(|i| fields[PARAM + i] = S::from_f64(param[i]));
-        points.push(0, &fields);
+        points.push(0, &fields, false);
     }
-    points.seal();
+    points.settle();
     points
 }
 
