@@ -145,7 +145,7 @@ impl<'a, S: Real> Shader<'a, S> {
         let ao_length = settings.ao_radius * diagonal;
         let looks = Arc::new(Looks::new(description));
         let paths = (settings.integrator == Integrator::Path)
-            .then(|| Paths::new(world, description, looks.clone(), engine, default_light, &settings));
+            .then(|| Paths::new(world, description, looks.clone(), engine, &settings));
         let lights = if description.lights.is_empty() { vec![default_light] } else { description.lights.clone() };
         Self {
             world,

@@ -35,14 +35,12 @@ pub struct Lights<'a> {
 }
 
 impl<'a> Lights<'a> {
-    /// The lights of `description`, `headlight` if nothing shines in it, and the emitting surfaces of `world`.
-    pub fn new<S: Real>(world: &World<S>, description: &'a Description, looks: &Looks<'_>, headlight: Light) -> Self {
+    /// The lights of `description` and the emitting surfaces of `world`; where nothing shines, a sky of radiance 1 in
+    /// all directions.
+    pub fn new<S: Real>(world: &World<S>, description: &'a Description, looks: &Looks<'_>) -> Self {
         let (runs, first, mut emitters) = surfaces(world, looks);
         emitters.extend(description.lights.iter().map(|&light| Emitter::Light(light)));
-        let is_dark = description.environment.is_none() && description.background == DVec3::ZERO;
-        if emitters.is_empty() && is_dark {
-            emitters.push(Emitter::Light(headlight));
-        }
+        let is_dark = emitters.is_empty() && description.environment.is_none() && description.background == DVec3::ZERO;
         let is_sun = |e: &Emitter| matches!(e, Emitter::Light(Light::Sun { .. }));
         let suns = (0..emitters.len()).filter(|&i| is_sun(&emitters[i])).collect();
         let sky = description.environment.as_ref().map(Sky::new);
@@ -60,7 +58,7 @@ impl<'a> Lights<'a> {
             sky_index,
             sky,
             suns,
-            background: description.background,
+            background: if is_dark { DVec3::ONE } else { description.background },
         }
     }
 

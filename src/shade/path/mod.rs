@@ -47,7 +47,7 @@ use super::through::{Again, MIXTURE, Through, number};
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::{Real, dot};
 use crate::ray::{Hits, Rays};
-use crate::scene::description::{Description, Light};
+use crate::scene::description::Description;
 use crate::scene::world::{Surface, World};
 use crate::trace::Engine;
 
@@ -96,17 +96,16 @@ impl<S: Real> Default for PathMemory<S> {
 }
 
 impl<'a, S: Real> Paths<'a, S> {
-    /// Paths of at most `settings.depth` scatterings through `world`, compiled from `description`; `headlight` lights a scene
-    /// in which nothing shines.
+    /// Paths of at most `settings.depth` scatterings through `world`, compiled from `description`; a scene in which
+    /// nothing shines has a white sky.
     pub fn new(
         world: &'a World<S>,
         description: &'a Description,
         looks: Arc<Looks<'a>>,
         engine: &'a dyn Engine<S>,
-        headlight: Light,
         settings: &Settings,
     ) -> Self {
-        let lights = Lights::new(world, description, &looks, headlight);
+        let lights = Lights::new(world, description, &looks);
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
         let Settings { depth, seed, first_hits, .. } = *settings;
         Self { world, engine, looks, lights, depth, seed, first_hits, shadow_end }
