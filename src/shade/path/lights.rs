@@ -188,8 +188,7 @@ fn surfaces<S: Real>(world: &World<S>, looks: &Looks<'_>) -> (Vec<Vec<Run>>, Vec
 fn surface(part: &Part, prim: u32, inst: u32, material: u32, to_world: &glam::DAffine3) -> Emitter {
     match &part.kind {
         PartKind::Mesh(mesh) => {
-            let corners = mesh.corners((prim - part.first_prim) as usize).map(|p| to_world.transform_point3(p));
-            Emitter::triangle(corners, material, prim, inst)
+            Emitter::triangle(to_world, mesh.corners((prim - part.first_prim) as usize), material, prim, inst)
         }
         PartKind::Shape(Shape::Sphere) => Emitter::sphere(to_world, material),
         PartKind::Shape(Shape::Disc) => Emitter::disc(to_world, material),
