@@ -161,11 +161,20 @@ impl<'a> Looks<'a> {
 
     /// Radiance that material `id` emits at `surface` to the side of its normal (`from_front`) or the other one.
     pub fn emission(&self, id: u32, surface: &Surface, from_front: bool) -> DVec3 {
+        self.emission_at(id, from_front, |set| surface.uv(set))
+    }
+
+    /// The same of a surface without texture coordinates, whose opacity is counted in.
+    pub fn even_emission(&self, id: u32, from_front: bool) -> DVec3 {
+        self.emission_at(id, from_front, |_| [0.0; 2]) * self.opacity_at(id, |_| [0.0; 2])
+    }
+
+    fn emission_at(&self, id: u32, from_front: bool, uv: impl Fn(u8) -> [f64; 2]) -> DVec3 {
         let material = self.material(id);
         if material.emission == DVec3::ZERO || material.one_sided && !from_front {
             return DVec3::ZERO;
         }
-        let texture = self.sample(material.textures.emission.as_ref(), surface);
+        let texture = self.sample_at(material.textures.emission.as_ref(), uv);
         material.emission * texture.map_or(DVec3::ONE, rgb)
     }
 
@@ -188,10 +197,14 @@ impl<'a> Looks<'a> {
 
     /// Share of light that material `id` stops at `surface`.
     pub fn opacity(&self, id: u32, surface: &Surface) -> f64 {
+        self.opacity_at(id, |set| surface.uv(set))
+    }
+
+    fn opacity_at(&self, id: u32, uv: impl Fn(u8) -> [f64; 2]) -> f64 {
         let material = self.material(id);
         let opacity = || {
-            let base = self.sample(material.textures.base.as_ref(), surface).map_or(1.0, |c| f64::from(c[3]));
-            let own = self.sample(material.textures.opacity.as_ref(), surface).map_or(1.0, |c| f64::from(c[0]));
+            let base = self.sample_at(material.textures.base.as_ref(), &uv).map_or(1.0, |c| f64::from(c[3]));
+            let own = self.sample_at(material.textures.opacity.as_ref(), &uv).map_or(1.0, |c| f64::from(c[0]));
             (material.opacity * base * own).clamp(0.0, 1.0)
         };
         match material.alpha {
@@ -216,8 +229,13 @@ impl<'a> Looks<'a> {
     }
 
     fn sample(&self, use_of: Option<&TextureRef>, surface: &Surface) -> Option<[f32; 4]> {
+        self.sample_at(use_of, |set| surface.uv(set))
+    }
+
+    /// Value of a texture at the coordinates that `uv` gives for their set.
+    fn sample_at(&self, use_of: Option<&TextureRef>, uv: impl Fn(u8) -> [f64; 2]) -> Option<[f32; 4]> {
         let r = use_of?;
-        Some(self.textures.get(r.texture as usize)?.sample(r, surface.uv(r.uv_set)))
+        Some(self.textures.get(r.texture as usize)?.sample(r, uv(r.uv_set)))
     }
 }
 

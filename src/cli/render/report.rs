@@ -62,7 +62,7 @@ pub(super) fn report<'a>(
     let (film, rays) = (&output.film, output.rays);
     Report {
         scene: &args.scene.scene,
-        file: args.file.path.display().to_string(),
+        file: args.file(),
         size: (film.width, film.height),
         window: (film.window.x0, film.window.y0, film.window.x1, film.window.y1),
         planes: film.planes.iter().map(|plane| plane.name.as_str()).collect(),

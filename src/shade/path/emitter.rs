@@ -86,7 +86,7 @@ impl Emitter {
     /// What packets need of a triangle of even radiance.
     pub fn flat(&self, looks: &Looks<'_>) -> Option<Flat> {
         let Self::Triangle { corner, edges, normal, area, material, .. } = *self else { return None };
-        if looks.material(material).textures.emission.is_some() {
+        if looks.material(material).textures.emission.is_some() || looks.is_holed(material) {
             return None;
         }
         let mut numbers = [0.0; 19];
@@ -97,10 +97,11 @@ impl Emitter {
         Some(Flat { numbers })
     }
 
-    /// A triangle with world-space `corners`.
-    pub fn triangle(corners: [DVec3; 3], material: u32, prim: u32, inst: u32) -> Self {
-        let [a, b, c] = corners;
-        let cross = (b - a).cross(c - a);
+    /// The image of a triangle with `corners`.
+    pub fn triangle(to_world: &DAffine3, corners: [DVec3; 3], material: u32, prim: u32, inst: u32) -> Self {
+        let [a, b, c] = corners.map(|p| to_world.transform_point3(p));
+        // A mirroring map leaves the front where it was wound, as [`World::surface`] does.
+        let cross = (b - a).cross(c - a) * to_world.matrix3.determinant().signum();
         let (normal, area) = (cross.normalize_or_zero(), 0.5 * cross.length());
         Self::Triangle { corner: a, edges: [b - a, c - a], normal, area, material, ids: [prim, inst] }
     }
@@ -163,9 +164,9 @@ impl Emitter {
                 let mut aim = planar(from, target, normal, area)?;
                 let front = normal.dot(aim.dir) < 0.0;
                 let own = looks.material(material);
-                aim.radiance = if own.textures.emission.is_some() {
+                aim.radiance = if own.textures.emission.is_some() || looks.is_holed(material) {
                     let surface = world.surface(target, DVec3::ZERO, 0.0, b, c, ids[0], ids[1]);
-                    looks.emission(material, &surface, front)
+                    looks.emission(material, &surface, front) * looks.opacity(material, &surface)
                 } else {
                     plain(looks, material, front)
                 };
@@ -175,12 +176,12 @@ impl Emitter {
                 let radius = place[0].sqrt();
                 let (sin, cos) = (TAU * place[1]).sin_cos();
                 let mut aim = planar(from, centre + axes[0] * (radius * cos) + axes[1] * (radius * sin), normal, area)?;
-                aim.radiance = plain(looks, material, normal.dot(aim.dir) < 0.0);
+                aim.radiance = looks.even_emission(material, normal.dot(aim.dir) < 0.0);
                 Some(aim)
             }
             Self::Sphere { centre, radius, material } => {
                 let mut aim = aim_at_sphere(from, centre, radius, place)?;
-                aim.radiance = plain(looks, material, (aim.target - centre).dot(aim.dir) < 0.0);
+                aim.radiance = looks.even_emission(material, (aim.target - centre).dot(aim.dir) < 0.0);
                 Some(aim)
             }
             Self::Unaimed => None,

@@ -37,7 +37,7 @@ pub struct Lights<'a> {
 impl<'a> Lights<'a> {
     /// The lights of `description` and the emitting surfaces of `world`; where nothing shines, a sky of radiance 1 in
     /// all directions.
-    pub fn new<S: Real>(world: &World<S>, description: &'a Description, looks: &Looks<'_>, headlight: Light) -> Self {
+    pub fn new<S: Real>(world: &World<S>, description: &'a Description, looks: &Looks<'_>) -> Self {
         let (runs, first, mut emitters) = surfaces(world, looks);
         emitters.extend(description.lights.iter().map(|&light| Emitter::Light(light)));
         let is_dark = emitters.is_empty() && description.environment.is_none() && description.background == DVec3::ZERO;
@@ -188,8 +188,7 @@ fn surfaces<S: Real>(world: &World<S>, looks: &Looks<'_>) -> (Vec<Vec<Run>>, Vec
 fn surface(part: &Part, prim: u32, inst: u32, material: u32, to_world: &glam::DAffine3) -> Emitter {
     match &part.kind {
         PartKind::Mesh(mesh) => {
-            let corners = mesh.corners((prim - part.first_prim) as usize).map(|p| to_world.transform_point3(p));
-            Emitter::triangle(corners, material, prim, inst)
+            Emitter::triangle(to_world, mesh.corners((prim - part.first_prim) as usize), material, prim, inst)
         }
         PartKind::Shape(Shape::Sphere) => Emitter::sphere(to_world, material),
         PartKind::Shape(Shape::Disc) => Emitter::disc(to_world, material),

@@ -90,3 +90,6 @@ fn only<V: Lanes>(mask: V::Mask, value: Value<V>) -> Value<V> {
     let zero = V::constant(0.0);
     Value { value: value.value.map(|x| V::select(mask, x, zero)), pdf: V::select(mask, value.pdf, zero) }
 }
+
+#[cfg(test)]
+mod tests;
