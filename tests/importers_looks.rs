@@ -144,3 +144,26 @@ fn libraries_that_are_no_files_or_too_large() {
     let error = open(&large, "m.obj").unwrap_err().to_string();
     assert!(error.ends_with("sub large.mtl: larger than 8 MiB, the limit for material libraries"), "{error}");
 }
+
+#[test]
+fn info_counts_what_shines_and_what_is_painted() {
+    let picture = png(2, &[[255; 4]; 4]);
+    let obj = format!("mtllib m.mtl\n{SQUARE}usemtl red\n{FACE}");
+    let folder = folder(&[
+        ("s.kdl", b"mesh \"m.obj\"\nlight sun direction=\"0, -1, 0\"\nenvironment sky\nmaterial \"l\" emission=3\nbox"),
+        ("m.obj", obj.as_bytes()),
+        ("m.mtl", b"newmtl red\nmap_Kd red.png\n"),
+        ("red.png", &picture),
+    ]);
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_lanecast"))
+        .args(["info", "--json"])
+        .arg(folder.path().join("s.kdl"))
+        .output()
+        .unwrap();
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let count = |name: &str| report["counts"][name].as_u64().unwrap();
+    assert_eq!((count("textures"), count("texture_bytes")), (2, 16 + 256 * 128 * 16), "the sky is one");
+    assert_eq!((count("lights"), count("emissive_materials"), count("materials")), (1, 1, 3));
+    assert_eq!((count("meshes"), count("meshes_with_normals"), count("meshes_with_coordinates")), (1, 1, 1));
+    assert_eq!(report["counts"]["environment"], true);
+}

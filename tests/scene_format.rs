@@ -31,12 +31,27 @@ fn files_and_built_in_scenes_are_the_same() {
         assert_eq!(from_file.source.take(), Some(file_of(name)));
         assert_eq!(from_file.hash, inside.hash);
         assert!(format!("{from_file:?}") == format!("{inside:?}"), "{name} differs");
-        assert!(!inside.cameras.is_empty() && !inside.lights.is_empty() && inside.materials.len() > 1, "{name}");
+        let shines =
+            inside.background.max_element() > 0.0 || inside.materials.iter().any(|m| m.emission.max_element() > 0.0);
+        assert!(!inside.cameras.is_empty() && inside.materials.len() > 1, "{name}");
+        assert!(!inside.lights.is_empty() || shines, "{name} is dark");
     }
     let error = load("builtin:forrest", &LoadOptions::default()).unwrap_err().to_string();
     assert!(error.contains("did you mean `builtin:forest`?"), "{error}");
     let error = load("forest", &LoadOptions::default()).unwrap_err().to_string();
     assert!(error.contains(".kdl .obj .ply .stl") && error.contains("did you mean `builtin:forest`?"), "{error}");
+}
+
+/// The box for paths has the room of the other one, and a lamp in place of its light.
+#[test]
+fn the_cornell_boxes_are_one_room() {
+    let (box_, room) = (built_in("cornell-box", &[]), built_in("cornell", &[]));
+    assert_eq!(box_.meshes, room.meshes);
+    assert!(box_.lights.is_empty() && box_.background == DVec3::ZERO && box_.cameras == room.cameras);
+    let lamp = box_.materials.iter().find(|m| m.name == "lamp").unwrap();
+    assert!(lamp.one_sided && lamp.emission.x > 20.0);
+    let [a, b, c] = box_.meshes[1].corners(0);
+    assert!((b - a).cross(c - a).normalize() == DVec3::NEG_Y, "the lamp shines down");
 }
 
 #[test]

@@ -51,7 +51,14 @@ struct Counts {
     dropped_nonfinite: u64,
     dropped_degenerate: u64,
     materials: usize,
+    emissive_materials: usize,
     lights: usize,
+    environment: bool,
+    textures: usize,
+    texture_bytes: u64,
+    meshes: usize,
+    meshes_with_normals: usize,
+    meshes_with_coordinates: usize,
 }
 
 #[derive(serde::Serialize)]
@@ -105,6 +112,8 @@ fn info<S: Engines>(args: &InfoArgs, description: &Description) -> Result<()> {
 fn report<'a, S: Engines>(scene: &'a str, description: &'a Description, world: &World<S>) -> Report<'a> {
     let stats = world.stats();
     let total = stats.node_bytes + stats.prim_bytes;
+    let meshes = &description.meshes;
+    let textures = description.textures.iter().chain(description.environment.as_ref().map(|e| &e.texture));
     Report {
         scene,
         name: &description.name,
@@ -118,7 +127,14 @@ fn report<'a, S: Engines>(scene: &'a str, description: &'a Description, world: &
             dropped_nonfinite: stats.dropped_nonfinite,
             dropped_degenerate: stats.dropped_degenerate,
             materials: description.materials.len(),
+            emissive_materials: description.materials.iter().filter(|m| m.emission.max_element() > 0.0).count(),
             lights: description.lights.len(),
+            environment: description.environment.is_some(),
+            textures: textures.clone().count(),
+            texture_bytes: textures.map(|t| t.bytes()).sum(),
+            meshes: meshes.len(),
+            meshes_with_normals: meshes.iter().filter(|m| !m.normals.values.is_empty()).count(),
+            meshes_with_coordinates: meshes.iter().filter(|m| m.uvs.iter().any(|uv| !uv.values.is_empty())).count(),
         },
         bounds: world.bounds().map(|(lo, hi)| Bounds {
             lower: lo.to_array(),
@@ -149,8 +165,13 @@ fn text(report: &Report<'_>) -> String {
         ("objects", format!("{}, placed {} times", counts.objects, counts.instances)),
         ("primitives", format!("{}, {} counting every instance", counts.primitives, counts.instanced_primitives)),
         ("dropped", format!("{} not finite, {} without area", counts.dropped_nonfinite, counts.dropped_degenerate)),
-        ("materials", counts.materials.to_string()),
-        ("lights", counts.lights.to_string()),
+        ("materials", format!("{}, {} of them emit light", counts.materials, counts.emissive_materials)),
+        ("lights", format!("{}{}", counts.lights, if counts.environment { " and an environment" } else { "" })),
+        ("textures", format!("{}, {}", counts.textures, mib(counts.texture_bytes))),
+        ("meshes", {
+            let (normals, coordinates) = (counts.meshes_with_normals, counts.meshes_with_coordinates);
+            format!("{}, {normals} with shading normals, {coordinates} with texture coordinates", counts.meshes)
+        }),
         ("cameras", if report.cameras.is_empty() { "none".into() } else { report.cameras.join(", ") }),
     ];
     match &report.bounds {

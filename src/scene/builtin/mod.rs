@@ -8,8 +8,23 @@ use super::kdl::{self, meshes::MeshFiles};
 use crate::error::{Error, Result, nearest_name};
 
 /// Names for `builtin:NAME`, in the order they are listed.
-pub const NAMES: [&str; 10] =
-    ["teaching", "sphere-flake", "cornell", "gallery", "terrain", "forest", "bolt", "die", "rook", "sponge"];
+pub const NAMES: [&str; 15] = [
+    "teaching",
+    "sphere-flake",
+    "cornell",
+    "gallery",
+    "terrain",
+    "forest",
+    "bolt",
+    "die",
+    "rook",
+    "sponge",
+    "cornell-box",
+    "still-life",
+    "materials",
+    "furnace",
+    "csg-lit",
+];
 
 /// The text of built-in scene `name`, in lanecast's scene format.
 pub fn text(name: &str) -> Option<&'static str> {
@@ -24,6 +39,11 @@ pub fn text(name: &str) -> Option<&'static str> {
         "die" => include_str!("../../../scenes/die.kdl"),
         "rook" => include_str!("../../../scenes/rook.kdl"),
         "sponge" => include_str!("../../../scenes/sponge.kdl"),
+        "cornell-box" => include_str!("../../../scenes/cornell-box.kdl"),
+        "still-life" => include_str!("../../../scenes/still-life.kdl"),
+        "materials" => include_str!("../../../scenes/materials.kdl"),
+        "furnace" => include_str!("../../../scenes/furnace.kdl"),
+        "csg-lit" => include_str!("../../../scenes/csg-lit.kdl"),
         _ => return None,
     })
 }

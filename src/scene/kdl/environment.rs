@@ -58,9 +58,8 @@ pub fn environment(
     } else {
         let mut images = Images::new(files);
         images.add(scope.source, written, span, Curve::Srgb)?;
-        let (textures, digests) = images.decode(scope.source)?;
-        let texture = floats(&textures[0]).map_err(|what| scope.source.error(span, what))?;
-        (texture, digests.first().copied())
+        let (texture, digest) = &images.decode(scope.source)?[0];
+        (floats(texture).map_err(|what| scope.source.error(span, what))?, Some(*digest))
     };
     Ok((Environment { texture, scale, to_world }, digest))
 }

@@ -42,15 +42,15 @@ impl<'f> Images<'f> {
         Ok(id)
     }
 
-    /// The textures by their numbers, and the SHA-256 of each picture.
+    /// The textures by their numbers, each with the SHA-256 of its picture.
     ///
     /// # Errors
     /// The first picture that cannot be read, where the scene names it.
-    pub fn decode(self, source: Source<'_>) -> Result<(Vec<Arc<Texture>>, Vec<[u8; 32]>)> {
+    pub fn decode(self, source: Source<'_>) -> Result<Vec<(Arc<Texture>, [u8; 32])>> {
         let all = decode_all(&self.list).map_err(|wrong| {
             let name = text::shown(self.list[wrong.index].name.as_bytes());
             source.error(self.spans[wrong.index], format!("{name}: {}", wrong.what))
         })?;
-        Ok(all.into_iter().map(|(texture, digest)| (Arc::new(texture), digest)).unzip())
+        Ok(all.into_iter().map(|(texture, digest)| (Arc::new(texture), digest)).collect())
     }
 }

@@ -131,7 +131,7 @@ fn declare<'a, 'n>(lowering: &mut Lowering<'a, 'n>, nodes: &'n [Node<'a>]) -> Re
     let known = &lowering.materials;
     let find = |name: &str| known.get(name).copied();
     materials::resolve(&lowering.scope, &mixes, &mut lowering.description.materials, find, known.keys().copied())?;
-    let (textures, digests) = images.decode(source)?;
+    let (textures, digests): (_, Vec<[u8; 32]>) = images.decode(source)?.into_iter().unzip();
     lowering.description.textures = textures;
     lowering.store.digests.extend(digests);
     Ok(())

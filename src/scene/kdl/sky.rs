@@ -11,8 +11,8 @@ use glam::{DMat3, DVec3};
 use crate::scene::texture::{Texels, Texture};
 
 /// Size of the picture.
-const WIDTH: u32 = 512;
-const HEIGHT: u32 = 256;
+const WIDTH: u32 = 256;
+const HEIGHT: u32 = 128;
 /// Luminance that is a radiance of 1, thousands of candela per square metre: a clear sky is about as bright as white
 /// paper in a picture, and its sun has an irradiance of about 10.
 const UNIT: f64 = 10.0;

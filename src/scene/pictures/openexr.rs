@@ -16,8 +16,7 @@ use crate::scene::texture::Texels;
 /// # Errors
 /// What is wrong with the header.
 pub(super) fn size(bytes: &[u8]) -> Result<(u32, u32), String> {
-    let (reader, _) = open(bytes)?;
-    let size = reader.headers()[0].layer_size;
+    let size = open(bytes)?.headers()[0].layer_size;
     let side = |n: usize| u32::try_from(n).map_err(|_| "too large".to_string());
     Ok((side(size.width())?, side(size.height())?))
 }
@@ -27,7 +26,8 @@ pub(super) fn size(bytes: &[u8]) -> Result<(u32, u32), String> {
 /// # Errors
 /// Damaged or truncated data.
 pub(super) fn texels(bytes: &[u8], header: &Header) -> Result<Texels, String> {
-    let (reader, grey) = open(bytes)?;
+    let reader = open(bytes)?;
+    let grey = !has_channel(&reader.headers()[0], "R");
     let (width, count) = (header.width as usize, header.width as usize * header.height as usize);
     let image = exr::image::read::read()
         .no_deep_data()
@@ -51,8 +51,8 @@ pub(super) fn texels(bytes: &[u8], header: &Header) -> Result<Texels, String> {
     Ok(Texels::Float(image.layer_data.channel_data.pixels))
 }
 
-/// A reader behind the headers, and whether the first part is grey.
-fn open(bytes: &[u8]) -> Result<(Reader<Cursor<&[u8]>>, bool), String> {
+/// A reader behind the headers: the first part has R, G and B, or else Y.
+fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, String> {
     let reader = exr::block::read(Cursor::new(bytes), false).map_err(|e| e.to_string())?;
     let Some(first) = reader.headers().first() else { return Err("it has no parts".into()) };
     if first.deep {
@@ -62,13 +62,12 @@ fn open(bytes: &[u8]) -> Result<(Reader<Cursor<&[u8]>>, bool), String> {
     if reader.headers().iter().any(|part| part.chunk_count as u64 > bytes.len() as u64 / 8) {
         return Err(format!("it claims more chunks than its {} bytes can hold", bytes.len()));
     }
-    let has = |name: &str| has_channel(first, name);
-    let grey = match (["R", "G", "B"].iter().all(|name| has(name)), has("Y")) {
-        (true, _) => false,
-        (false, true) => true,
-        (false, false) => return Err("expected the channels R, G and B, or Y".into()),
-    };
-    Ok((reader, grey))
+    let coloured = ["R", "G", "B"].iter().all(|name| has_channel(first, name));
+    // An R without the others would be taken for a colour.
+    if !coloured && (has_channel(first, "R") || !has_channel(first, "Y")) {
+        return Err("expected the channels R, G and B, or Y".into());
+    }
+    Ok(reader)
 }
 
 fn has_channel(part: &Part, name: &str) -> bool {
