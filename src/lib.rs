@@ -7,8 +7,8 @@
 //! | floor | modules | what lives there |
 //! |---|---|---|
 //! | 8 | [`cli`] | arguments, commands, progress, exit codes |
-//! | 7 | [`measure`] | ray sets, timing, statistics, verification, reports |
-//! | 6 | [`render`], [`mod@reference`] | the tile scheduler; the f64 oracle (floors 0, 3 and 5 only) |
+//! | 7 | [`measure`], [`view`] | ray sets, timing, statistics, verification, reports; terminal, viewers, windows |
+//! | 6 | [`render`], [`mod@reference`] | the tile scheduler, progressive blocks; the f64 oracle (floors 0, 3 and 5 only) |
 //! | 5 | [`film`], [`shade`] | framebuffer and image files; materials, lights, integrators |
 //! | 4 | [`trace`] | the engines behind one trait |
 //! | 3 | [`scene`], [`camera`] | description, importers, world; cameras, tiles, ray generation |
@@ -36,3 +36,4 @@ pub mod scene;
 pub mod shade;
 pub mod shape;
 pub mod trace;
+pub mod view;

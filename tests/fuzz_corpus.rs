@@ -98,6 +98,14 @@ fn experiment_corpus() {
 }
 
 #[test]
+fn script_corpus() {
+    let parse = |file: &Path, bytes: &[u8]| lanecast::view::script::parse(file, bytes).is_ok();
+    for (name, accepted) in verdicts("script", parse).into_iter().filter(|(name, _)| name.contains('.')) {
+        assert_eq!(accepted, name != "nan.txt" && name != "more.txt", "{name}");
+    }
+}
+
+#[test]
 fn mtl_corpus() {
     let parse = |file: &Path, bytes: &[u8]| lanecast::scene::mtl::parse(file, bytes).is_ok();
     for (name, accepted) in verdicts("mtl", parse).into_iter().filter(|(name, _)| name.contains('.')) {

@@ -14,7 +14,7 @@ const FLOORS: [&[&str]; 9] = [
     &["trace"],
     &["film", "shade"],
     &["render", "reference"],
-    &["measure"],
+    &["measure", "view"],
     &["cli"],
 ];
 
@@ -293,6 +293,7 @@ fn planted_faults_are_found() {
         ("reference/ray.rs", "use crate::math::Affine;", "judges"),
         ("reference/ray.rs", "use crate::scene::{assembly, world::World};", "judges"),
         ("render/mod.rs", "use crate::reference::Oracle;", "oracle"),
+        ("view/mod.rs", "use crate::measure::rows::Row;", "neighbour"),
         ("trace/mod.rs", "use crate::reference::Oracle;", "upward"),
         ("shape/cone.rs", "let x = wide::f32x8::ZERO;", "wide"),
         ("film/npy.rs", "let x = unsafe { y() };", "unsafe"),

@@ -41,7 +41,7 @@ pub enum SubPixel {
 
 impl SubPixel {
     #[inline]
-    fn offset(self, anchor: [f64; 2], x: u32, y: u32) -> [f64; 2] {
+    pub(super) fn offset(self, anchor: [f64; 2], x: u32, y: u32) -> [f64; 2] {
         match self {
             Self::Anchor => anchor,
             Self::Sample { sample, seed } => PixelRandom::new(x, y, seed).spread(sample, DIMENSION),

@@ -6,6 +6,7 @@ mod generate;
 mod matrices;
 mod model;
 pub mod sampling;
+mod scattered;
 pub mod sobol;
 mod tiles;
 
@@ -13,4 +14,5 @@ pub use filter::Filter;
 pub use framing::framing;
 pub use generate::{SubPixel, fill_tile};
 pub use model::{Camera, CameraOverrides};
+pub use scattered::fill_pixels;
 pub use tiles::{FILE_TILE, PixelRect, Tiling, morton_decode, morton_encode};

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::measure::timing::MAX_THREADS;
 use crate::scene::brlcad::describe::Options;
 use crate::scene::description::{Description, Precision};
-use crate::scene::load::{LoadOptions, load};
+use crate::scene::load::{LoadOptions, ReadMesh, load_with, read_mesh};
 use crate::scene::world::Preset;
 use crate::trace::{EXACT_ENGINE, Engine, Engines, engine as engine_called};
 
@@ -33,6 +33,11 @@ impl Default for EngineArgs {
 }
 
 impl EngineArgs {
+    /// The same, but for pictures by blocks: unless an engine is named, one that knows nothing of a ray's neighbours.
+    pub fn for_blocks(&self, by_blocks: bool) -> Self {
+        Self { exact: self.exact || by_blocks && self.engine == DEFAULT_ENGINE, ..self.clone() }
+    }
+
     /// The engine asked for.
     ///
     /// # Errors
@@ -104,7 +109,7 @@ impl SceneArgs {
     /// Opens the scene.
     ///
     /// # Errors
-    /// Those of [`load`].
+    /// Those of [`load_with`].
     pub fn load(&self) -> Result<Description> {
         self.options.load(&self.scene)
     }
@@ -114,10 +119,18 @@ impl SceneOptions {
     /// Opens `scene` with these options.
     ///
     /// # Errors
-    /// Those of [`load`].
+    /// Those of [`load_with`].
     pub fn load(&self, scene: &str) -> Result<Description> {
+        self.load_with(scene, &read_mesh)
+    }
+
+    /// The same with meshes read by `read`.
+    ///
+    /// # Errors
+    /// Those of [`load_with`].
+    pub fn load_with(&self, scene: &str, read: &ReadMesh<'_>) -> Result<Description> {
         let brlcad = Options { tops: self.top.clone(), lenient: self.lenient };
-        load(scene, &LoadOptions { set: self.set.clone(), allow_outside: self.allow_outside, brlcad })
+        load_with(scene, &LoadOptions { set: self.set.clone(), allow_outside: self.allow_outside, brlcad }, read)
     }
 
     /// The precision asked for here, else by the scene, else f32.

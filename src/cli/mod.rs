@@ -9,7 +9,9 @@ mod explain;
 mod info;
 mod interrupt;
 mod isa;
+mod live;
 mod picture;
+mod preview;
 mod rays;
 mod render;
 mod report;
@@ -57,6 +59,8 @@ struct Cli {
 enum Command {
     /// Render a picture: EXR, PNG or NPY
     Render(render::RenderArgs),
+    /// Walk around in a scene; it is opened anew when its files change
+    View(live::ViewArgs),
     /// Measure engines on ray classes: million rays per second, checked before timed
     Bench(bench::BenchArgs),
     /// Trace a file of rays and time it
@@ -102,6 +106,7 @@ pub fn main() -> ExitCode {
 fn run(command: &Command) -> Result<()> {
     let output = match command {
         Command::Render(args) => &args.output,
+        Command::View(args) => &args.output,
         Command::Bench(args) => &args.output,
         Command::Trace(args) => &args.output,
         Command::Rays(args) => &args.output,
@@ -116,6 +121,7 @@ fn run(command: &Command) -> Result<()> {
     }
     match command {
         Command::Render(args) => render::run(args),
+        Command::View(args) => live::run(args),
         Command::Bench(args) => bench::run(args),
         Command::Trace(args) => trace::run(args),
         Command::Rays(args) => rays::run(args),

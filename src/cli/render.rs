@@ -5,16 +5,17 @@ mod report;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use self::report::{Made, report, tell};
+use self::report::{Holds, Made, report, tell};
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
 use super::picture::{Format, Target, target, write};
+use super::preview::{Job, PreviewArgs};
 use crate::camera::Filter;
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::film::exr::ImageInfo;
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
-use crate::render::{Aov, Progress, RenderOptions, render};
+use crate::render::{Aov, Progress, RenderOptions};
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
 use crate::shade::{Integrator, unknown_shaders};
@@ -38,11 +39,14 @@ const EXAMPLES: &str = "\
 Examples:
   lanecast render builtin:sphere-flake -o flake.png
   lanecast render model.ply -o model.exr --aov Z,N,id.primitive --spp 16
+  lanecast render builtin:cornell --integrator path --spp 256 -o box.exr -o box.png --stats
+  lanecast render scene.glb --integrator path --noise 0.02 --time-limit 60 -o scene.exr --filter blackman-harris
   lanecast render model.ply -o ao.png --integrator ao --ao-samples 64 --exposure 0.5
   lanecast render scene.kdl -o cut.exr --size 1920x1080 --crop 100,100,400,300 --camera side
   lanecast render model.obj -o near.png --eye 0,1,5 --look-at 0,1,0 --fov 35
   lanecast render moss.asc --top all.g --view moss.rt --rt-compat --size 512x512 -o moss.pix
   lanecast render m35.asc --az 90 --el 0 --lenient -o front.png
+  lanecast render builtin:forest -o forest.exr --spp 64 --preview tev
 
 The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as
 float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy), .pix (BRL-CAD's: linear,
@@ -54,9 +58,9 @@ float, shape (height, width, 4); each further plane in a file beside it, NAME.PL
 pub struct RenderArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// File to write: .exr, .png, .npy or .pix
-    #[arg(short = 'o', long = "output", value_name = "FILE", value_parser = target)]
-    file: Target,
+    /// File to write: .exr, .png, .npy or .pix; several -o write the same picture in several formats
+    #[arg(short = 'o', long = "output", value_name = "FILE", required = true, value_parser = target)]
+    files: Vec<Target>,
     #[command(flatten)]
     camera: CameraArgs,
     /// Part of the picture to render, pixels, y down, half open
@@ -108,6 +112,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "PIXELS", default_value_t = 32)]
     tile: u32,
     #[command(flatten)]
+    preview: PreviewArgs,
+    #[command(flatten)]
     threads: ThreadArgs,
     #[command(flatten)]
     pub(super) output: OutputArgs,
@@ -130,11 +136,16 @@ impl Progress for Watch {
 }
 
 impl RenderArgs {
+    /// The first file to write.
+    fn file(&self) -> String {
+        self.files.first().map(|file| file.path.display().to_string()).unwrap_or_default()
+    }
+
     /// The arguments of a plain EXR picture of a scene: what a bench leaves beside its rows.
     pub(super) fn plain(scene: SceneArgs, camera: CameraArgs, threads: ThreadArgs, path: PathBuf) -> Self {
         Self {
             scene,
-            file: Target { path, format: Format::Exr },
+            files: vec![Target { path, format: Format::Exr }],
             camera,
             crop: None,
             integrator: Integrator::Whitted,
@@ -152,6 +163,7 @@ impl RenderArgs {
             exposure: 0.0,
             engine: EngineArgs::default(),
             tile: 32,
+            preview: PreviewArgs::default(),
             threads,
             output: OutputArgs::default(),
         }
@@ -234,20 +246,31 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         count: args.output.verbose > 0,
     };
     options.check()?;
-    if matches!(args.file.format, Format::Png | Format::Pix) && !options.aovs.is_empty() {
+    let holds_planes = |file: &Target| !matches!(file.format, Format::Png | Format::Pix);
+    if !options.aovs.is_empty() && !args.files.iter().any(holds_planes) {
         return Err(Error::Usage("PNG and .pix hold colours only: --aov needs .exr or .npy".into()));
     }
     Ok(options)
 }
 
 fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
-    let engine = args.engine.find::<S>()?;
+    let engine = args.engine.for_blocks(args.preview.by_blocks()).find::<S>()?;
     let world = World::<S>::compile(description, args.scene.options.preset())?;
     let (width, height) = (options.width, options.height);
     let camera_args = if args.rt_compat { args.camera.or_default_view() } else { args.camera.clone() };
     let camera = camera_args.ready(description, world.bounds(), (width, height))?;
     let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
-    let output = render(&world, description, &camera, options, &watch)?;
+    let job = Job {
+        engine,
+        world: &world,
+        description,
+        camera: &camera,
+        options,
+        exposure: args.exposure,
+        name: &args.file(),
+        output: &args.output,
+    };
+    let output = job.render(&args.preview, &watch)?;
     watch.bar.finish_and_clear();
     let info = ImageInfo {
         software: concat!("lanecast ", env!("CARGO_PKG_VERSION")).into(),
@@ -266,9 +289,11 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
     };
     // Without a finished tile there is nothing to show, and an older picture is worth more.
     if output.tiles_done > 0 {
-        write(&args.file, &output.film, &info, args.exposure)?;
+        args.files.iter().try_for_each(|file| write(file, &output.film, &info, args.exposure))?;
     }
-    let made = Made { engine: engine.name(), precision: S::PRECISION, build_seconds: world.stats().build_seconds };
+    let stats = world.stats();
+    let (engine, precision, build_seconds) = (engine.name(), S::PRECISION, stats.build_seconds);
+    let made = Made { engine, precision, build_seconds, holds: Holds::new(&stats, description) };
     tell(args, &report(args, options, &output, &made), &output)?;
     if output.is_complete() { Ok(()) } else { Err(Error::Interrupted) }
 }

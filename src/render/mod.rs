@@ -1,8 +1,9 @@
-//! Pictures: tiles over threads, samples into pixels, pixels into a film.
+//! Pictures: tiles over threads, samples into pixels, pixels into a film; at once, or block by block while one watches.
 
 mod aov;
 mod options;
 mod pixels;
+pub mod progressive;
 mod scheduler;
 
 pub use aov::Aov;

@@ -29,33 +29,44 @@ pub struct LoadOptions {
     pub allow_outside: bool,
 }
 
+/// How a mesh file is read.
+pub type ReadMesh<'a> = dyn Fn(&Path, &References<'_>) -> Result<MeshFile> + 'a;
+
 /// Opens `scene`: `builtin:NAME` or a path.
 ///
 /// # Errors
 /// Unknown built-in names and extensions, unreadable or malformed files, unknown `--set` names.
 pub fn load(scene: &str, options: &LoadOptions) -> Result<Description> {
+    load_with(scene, options, &read_mesh)
+}
+
+/// As [`load`], with meshes read by `read` (see [`read_mesh`]) instead: for who remembers them.
+///
+/// # Errors
+/// As [`load`], and those of `read`.
+pub fn load_with(scene: &str, options: &LoadOptions, read: &ReadMesh<'_>) -> Result<Description> {
     if let Some(name) = scene.strip_prefix("builtin:") {
         return builtin::load(name, &options.set);
     }
     let path = Path::new(scene);
     let mut description = match extension(path)?.as_str() {
-        "kdl" => scene_file(path, options)?,
+        "kdl" => scene_file(path, options, read)?,
         "gltf" | "glb" => gltf_scene(path, options)?,
         "asc" => database(path, options)?,
-        _ => mesh_scene(path, options)?,
+        _ => mesh_scene(path, options, read)?,
     };
     description.source = Some(path.to_path_buf());
     Ok(description)
 }
 
-fn scene_file(path: &Path, options: &LoadOptions) -> Result<Description> {
+fn scene_file(path: &Path, options: &LoadOptions, read: &ReadMesh<'_>) -> Result<Description> {
     let mut bytes = Vec::new();
     // One byte over the limit is enough for the parser to refuse the file, whatever its size.
     let file = File::open(path).map_err(|e| Error::io(path, e))?;
     file.take(kdl::MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, e))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let references = References { folder: Some(folder), allow_outside: options.allow_outside };
-    let read = |path: &Path| read_mesh(path, &references);
+    let read = |path: &Path| read(path, &references);
     let files = MeshFiles { folder: Some(folder), allow_outside: options.allow_outside, read: &read };
     kdl::parse(path, &stem(path), &bytes, &options.set, &files)
 }
@@ -87,11 +98,11 @@ fn refuse_set(path: &Path, options: &LoadOptions) -> Result<()> {
 }
 
 /// A scene of one mesh.
-fn mesh_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
+fn mesh_scene(path: &Path, options: &LoadOptions, read: &ReadMesh<'_>) -> Result<Description> {
     refuse_set(path, options)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let references = References { folder: Some(folder), allow_outside: options.allow_outside };
-    let MeshFile { mut mesh, digest, looks } = read_mesh(path, &references)?;
+    let MeshFile { mut mesh, digest, looks } = read(path, &references)?;
     let mut description = Description::new(stem(path));
     let digest = match looks.digests.as_slice() {
         [] => digest,

@@ -6,12 +6,12 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use super::runs::Runs;
-use super::{Class, Counts, Instance, Object, PlacedSolid, World, solids};
+use super::{Class, Counts, Instance, Object, PlacedSolid, World, solids, successor};
 use crate::bvh::{self, LEAF_PRIMS, Leaf, Preset, Tree};
 use crate::error::Result;
 use crate::lanes::Real;
 use crate::math::{Aabb, Affine, transformed_bounds};
-use crate::scene::assembly::{Assembly, Part, PartKind, Placement};
+use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind, Placement};
 use crate::scene::description::{Description, Shape};
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::flat::FlatTree;
@@ -29,23 +29,43 @@ impl<S: Real> World<S> {
     /// # Errors
     /// Those of [`Assembly::new`].
     pub fn compile(description: &Description, preset: Preset) -> Result<Self> {
+        Self::compile_after(description, preset, None)
+    }
+
+    /// As [`Self::compile`], but objects whose geometry `before`, compiled with the same preset, has too are copied from
+    /// it. The world is the same, to the last bit.
+    ///
+    /// # Errors
+    /// Those of [`Assembly::new`].
+    pub fn compile_after(description: &Description, preset: Preset, before: Option<&Self>) -> Result<Self> {
         let start = Instant::now();
         let assembly = Assembly::new(description)?;
-        let mut counts = Counts::default();
+        let mut counts = Vec::with_capacity(assembly.objects.len());
         let mut objects = Vec::with_capacity(assembly.objects.len());
         for object in &assembly.objects {
-            let mut primitives = Primitives::default();
-            for part in &object.parts {
-                primitives.add(part, preset, &mut counts);
-            }
-            objects.push(primitives.build(preset));
+            let known = before.and_then(|world| Some((world, successor::find(object, &world.assembly.objects)?)));
+            let (built, count) = match known {
+                Some((world, same)) => (world.objects[same].clone(), world.counts[same]),
+                None => build(object, preset),
+            };
+            objects.push(built);
+            counts.push(count);
         }
         let instances: Vec<_> = assembly.placements.iter().map(|p| instance(p, &objects)).collect();
         let (top, top_blocks, unbounded_instances) = upper_tree(&instances, preset);
         let runs = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
-        counts.build_seconds = start.elapsed().as_secs_f64();
-        Ok(Self { assembly, objects, instances, top, top_blocks, unbounded_instances, runs, counts })
+        let build_seconds = start.elapsed().as_secs_f64();
+        Ok(Self { assembly, objects, instances, top, top_blocks, unbounded_instances, runs, counts, build_seconds })
     }
+}
+
+/// One object, and what was dropped of it.
+fn build<S: Real>(object: &AssemblyObject, preset: Preset) -> (Object<S>, Counts) {
+    let (mut primitives, mut counts) = (Primitives::default(), Counts::default());
+    for part in &object.parts {
+        primitives.add(part, preset, &mut counts);
+    }
+    (primitives.build(preset), counts)
 }
 
 /// A primitive's numbers before it has a place in a block.

@@ -6,6 +6,7 @@
 mod compile;
 mod runs;
 mod solids;
+mod successor;
 mod surface;
 
 use glam::DVec3;
@@ -134,16 +135,17 @@ pub struct World<S> {
     pub unbounded_instances: Vec<u32>,
     /// Per object: its runs.
     runs: Vec<Runs>,
-    counts: Counts,
+    /// By object.
+    counts: Vec<Counts>,
+    build_seconds: f64,
 }
 
-/// What compiling found.
+/// What compiling dropped of an object.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     nonfinite: u64,
     degenerate: u64,
     singular: u64,
-    build_seconds: f64,
 }
 
 /// Counts and sizes of a world, for `info` and `trace --json`.
@@ -210,10 +212,10 @@ impl<S: Real> World<S> {
             objects: self.objects.len() as u64,
             instances: self.instances.len() as u64,
             instanced_prims: self.assembly.instanced_prims(),
-            dropped_nonfinite: self.counts.nonfinite,
-            dropped_degenerate: self.counts.degenerate,
-            dropped_singular: self.counts.singular,
-            build_seconds: self.counts.build_seconds,
+            dropped_nonfinite: self.counts.iter().map(|c| c.nonfinite).sum(),
+            dropped_degenerate: self.counts.iter().map(|c| c.degenerate).sum(),
+            dropped_singular: self.counts.iter().map(|c| c.singular).sum(),
+            build_seconds: self.build_seconds,
             ..Default::default()
         };
         let mut most = 0;

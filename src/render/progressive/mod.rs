@@ -1,0 +1,333 @@
+//! Pictures that appear as blocks: one ray colours 16 x 16 pixels, then 8, 4, 2, 1, then each pixel gets further samples.
+//!
+//! Source: F. S. Hill, *Computer Graphics Using OpenGL*, ray tracing chapter (pixel blocks). His framebuffer is asked
+//! whether a pixel is set; ours too. Rays of one step are traced as batches of neighbouring blocks in Morton order, so that
+//! packets stay as coherent as the step allows.
+//!
+//! # Same bits
+//! With an exact engine ([`Engine::is_exact`]) a pixel's value depends on camera, pixel, sample and seed alone: the
+//! finished picture is that of [`super::render_with`] bit for bit. Where it depends on the neighbours in the batch too (an
+//! engine that is not exact, or costs, which are counted per 4 x 4 pixels) there are no coarse blocks: whole tiles come
+//! first, the batches of the plain render, and the bits are the same again.
+
+mod framebuffer;
+mod steps;
+
+use std::mem::take;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+pub use framebuffer::Framebuffer;
+pub use steps::{LARGEST_BLOCK, Step};
+
+use super::options::{Progress, RenderOptions, rect_of};
+use super::pixels::{Painter, add, mean};
+use super::scheduler::RenderOutput;
+use crate::camera::{Camera, PixelRect, Tiling, fill_pixels, fill_tile, morton_decode};
+use crate::error::{Error, Result};
+use crate::film::Window;
+use crate::lanes::Real;
+use crate::ray::{Counters, Rays};
+use crate::scene::description::Description;
+use crate::scene::world::World;
+use crate::shade::{PathStats, RayCounts, Sample, Shader, Workspace, headlight};
+use crate::trace::Engine;
+use steps::{Lattice, check_start, plan};
+
+/// Who looks at a picture in the making; called from all threads.
+pub trait Viewer: Sync {
+    /// Pixels of `part` have changed. The framebuffer is locked meanwhile: be quick.
+    fn painted(&self, frame: &Framebuffer, part: Window);
+    /// All of `step` is done.
+    fn step_done(&self, _frame: &Framebuffer, _step: Step) {}
+}
+
+/// Nobody looks.
+impl Viewer for () {
+    fn painted(&self, _: &Framebuffer, _: Window) {}
+}
+
+/// A picture in the making. It can be stopped between batches at any time, looked at, and continued.
+pub struct Progressive<'a, S: Real> {
+    shader: Shader<'a, S>,
+    camera: &'a Camera,
+    options: &'a RenderOptions,
+    tiling: Tiling,
+    window: Window,
+    rect: PixelRect,
+    start: u32,
+    /// Tiles of the window, and what is known of each.
+    tiles: Vec<(u32, Mutex<Tile>)>,
+    frame: Mutex<Framebuffer>,
+    /// Batches of all steps.
+    total: u64,
+    tally: Tally,
+    seconds: f64,
+}
+
+/// Samples of one tile.
+#[derive(Default)]
+struct Tile {
+    /// Samples of each pixel.
+    samples: u32,
+    /// Their sums in Morton order; empty while there is no use for them.
+    sums: Vec<Sample>,
+}
+
+/// One thread's arrays.
+struct Memory<S> {
+    rays: Rays<S>,
+    work: Workspace<S>,
+    pixels: Vec<(u32, u32)>,
+    samples: Vec<Sample>,
+    /// Samples made, not yet summed up.
+    traced: u64,
+}
+
+impl<S: Real> Default for Memory<S> {
+    fn default() -> Self {
+        let (rays, work) = (Rays::new(0), Workspace::default());
+        Self { rays, work, pixels: Vec::new(), samples: Vec::new(), traced: 0 }
+    }
+}
+
+/// What batches add up to.
+#[derive(Default)]
+struct Tally {
+    done: u64,
+    /// Samples over all pixels.
+    samples: u64,
+    rays: RayCounts,
+    counters: Counters,
+    paths: PathStats,
+}
+
+impl Tally {
+    fn plus(mut self, other: Self) -> Self {
+        self.done += other.done;
+        self.samples += other.samples;
+        self.rays += other.rays;
+        self.counters += other.counters;
+        self.paths.merge(&other.paths);
+        self
+    }
+}
+
+/// Who is told, and asked whether to stop.
+#[derive(Clone, Copy)]
+struct Watch<'w> {
+    progress: &'w dyn Progress,
+    viewer: &'w dyn Viewer,
+    total: u64,
+}
+
+impl<'a, S: Real> Progressive<'a, S> {
+    /// A picture of which nothing is traced yet, with first blocks of `start` pixels on a side (see the module for when
+    /// there are none). [`RenderOptions::engine`] is not looked at.
+    ///
+    /// # Errors
+    /// Options out of range, or a number of samples that is found while rendering; a start that is not 1, 2, 4, 8 or 16.
+    pub fn new(
+        engine: &'a dyn Engine<S>,
+        world: &'a World<S>,
+        description: &'a Description,
+        camera: &'a Camera,
+        options: &'a RenderOptions,
+        start: u32,
+    ) -> Result<Self> {
+        check_start(start)?;
+        let (tiling, window) = options.check()?;
+        if options.is_adaptive() {
+            let what = "pictures by blocks have a fixed number of samples: no time limit and no noise level";
+            return Err(Error::Usage(what.into()));
+        }
+        let settings = options.settings();
+        let start = if settings.cost || !engine.is_exact() { 1 } else { start };
+        let painter = Painter::new(options.width, options.height, window, &options.aovs);
+        let shader = Shader::new(world, description, engine, headlight(camera), settings).with_rt(description, camera);
+        let rect = rect_of(window);
+        let first = u32::from(start > 1);
+        let tile = |number| (number, Mutex::new(Tile { samples: first, sums: Vec::new() }));
+        let tiles: Vec<_> = tiling.tiles_in(rect).into_iter().map(tile).collect();
+        let batches = |step: &Step| match *step {
+            Step::Blocks(block) => u64::from(lattice(window, &tiling, block, start).batches_with_pixels()),
+            Step::Samples(_) => tiles.len() as u64,
+        };
+        let total = plan(start, options.spp).iter().map(batches).sum();
+        let frame = Mutex::new(Framebuffer::new(painter, start));
+        Ok(Self {
+            shader,
+            camera,
+            options,
+            tiling,
+            window,
+            rect,
+            start,
+            tiles,
+            frame,
+            total,
+            tally: Tally::default(),
+            seconds: 0.0,
+        })
+    }
+
+    /// Traces on the current rayon pool until the picture is finished or `progress` says stop; returns whether it is
+    /// finished. What an earlier call has traced is not traced again.
+    pub fn run(&mut self, progress: &dyn Progress, viewer: &dyn Viewer) -> bool {
+        let clock = Instant::now();
+        let watch = Watch { progress, viewer, total: self.total };
+        let mut finished = true;
+        for step in plan(self.start, self.options.spp) {
+            let stopped = AtomicBool::new(false);
+            let tally = match step {
+                Step::Blocks(block) => self.blocks(block, watch, &stopped),
+                Step::Samples(samples) => self.samples(samples, watch, &stopped),
+            };
+            self.tally = take(&mut self.tally).plus(tally);
+            if stopped.into_inner() {
+                finished = false;
+                break;
+            }
+            viewer.step_done(&locked(&self.frame), step);
+        }
+        self.seconds += clock.elapsed().as_secs_f64();
+        finished
+    }
+
+    /// Looks at the picture between runs.
+    pub fn look<R>(&self, eye: impl FnOnce(&Framebuffer) -> R) -> R {
+        eye(&locked(&self.frame))
+    }
+
+    /// The picture as it is.
+    pub fn finish(self) -> RenderOutput {
+        RenderOutput {
+            film: self.frame.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()).into_film(),
+            rays: self.tally.rays,
+            seconds: self.seconds,
+            counters: self.tally.counters,
+            paths: self.tally.paths,
+            tiles_done: self.tally.done,
+            tiles_total: self.total,
+            samples: self.tally.samples,
+        }
+    }
+
+    /// One ray for each block that has none.
+    fn blocks(&self, block: u32, watch: Watch<'_>, stopped: &AtomicBool) -> Tally {
+        let lattice = lattice(self.window, &self.tiling, block, self.start);
+        let one = |memory: &mut Memory<S>, batch: u32| {
+            memory.pixels.clear();
+            memory.pixels.extend(lattice.pixels(batch));
+            if self.tally.done > 0 {
+                let frame = locked(&self.frame);
+                memory.pixels.retain(|&(x, y)| !frame.is_set(x, y));
+            }
+            if memory.pixels.is_empty() || stop(watch, stopped) {
+                return Tally::default();
+            }
+            let size = (self.options.width, self.options.height);
+            fill_pixels(self.camera, size, &memory.pixels, self.options.sub_pixel(0), &mut memory.rays);
+            self.shader.shade(&memory.rays, &memory.pixels, 0, &mut memory.work, &mut memory.samples);
+            memory.traced += memory.pixels.len() as u64;
+            for (&(x, y), sample) in memory.pixels.iter().zip(&memory.samples) {
+                self.keep_first(x, y, sample);
+            }
+            let frame = &mut *locked(&self.frame);
+            for (&(x, y), sample) in memory.pixels.iter().zip(&memory.samples) {
+                let mut sum = Sample::MISS;
+                add(&mut sum, sample);
+                frame.put(x, y, &mean(&sum, 1));
+            }
+            self.told(watch, frame, lattice.part(batch), memory)
+        };
+        let batches = (0..lattice.batches()).into_par_iter();
+        batches.map_init(Memory::default, one).reduce(Tally::default, Tally::plus)
+    }
+
+    /// Keeps a pixel's first sample for those to come.
+    fn keep_first(&self, x: u32, y: u32, sample: &Sample) {
+        if self.options.spp == 1 {
+            return;
+        }
+        let per_tile = u64::from(self.tiling.rays_per_tile());
+        let index = self.tiling.index(x, y);
+        let Ok(place) = self.tiles.binary_search_by_key(&((index / per_tile) as u32), |(number, _)| *number) else {
+            return;
+        };
+        let tile = &mut *locked(&self.tiles[place].1);
+        tile.sums.resize(per_tile as usize, Sample::MISS);
+        add(&mut tile.sums[(index % per_tile) as usize], sample);
+    }
+
+    /// Whole tiles until each pixel has `samples` samples.
+    fn samples(&self, samples: u32, watch: Watch<'_>, stopped: &AtomicBool) -> Tally {
+        let one = |memory: &mut Memory<S>, (number, tile): &(u32, Mutex<Tile>)| {
+            let tile = &mut *locked(tile);
+            if tile.samples >= samples {
+                return Tally::default();
+            }
+            let count = self.tiling.rays_per_tile();
+            let (x0, y0) = self.tiling.origin(*number);
+            memory.pixels.clear();
+            memory.pixels.extend((0..count).map(morton_decode).map(|(dx, dy)| (x0 + dx, y0 + dy)));
+            tile.sums.resize(count as usize, Sample::MISS);
+            while tile.samples < samples {
+                if stop(watch, stopped) {
+                    return taken(memory, 0);
+                }
+                let sub_pixel = self.options.sub_pixel(tile.samples);
+                fill_tile(self.camera, &self.tiling, *number, self.rect, sub_pixel, &mut memory.rays);
+                let Memory { rays, work, pixels, samples: seen, traced } = memory;
+                self.shader.shade(rays, pixels, tile.samples, work, seen);
+                tile.sums.iter_mut().zip(seen).for_each(|(sum, sample)| add(sum, sample));
+                *traced += pixels.len() as u64;
+                tile.samples += 1;
+            }
+            let frame = &mut *locked(&self.frame);
+            for (&(x, y), sum) in memory.pixels.iter().zip(&tile.sums) {
+                frame.put(x, y, &mean(sum, samples));
+            }
+            if samples == self.options.spp {
+                tile.sums = Vec::new();
+            }
+            let edge = self.tiling.edge();
+            let (x1, y1) = ((x0 + edge).min(self.window.x1), (y0 + edge).min(self.window.y1));
+            let part = Window { x0: x0.max(self.window.x0), y0: y0.max(self.window.y0), x1, y1 };
+            self.told(watch, frame, part, memory)
+        };
+        self.tiles.par_iter().map_init(Memory::default, one).reduce(Tally::default, Tally::plus)
+    }
+
+    /// Tells who watches of a batch that is painted, and sums it up.
+    fn told(&self, watch: Watch<'_>, frame: &Framebuffer, part: Window, memory: &mut Memory<S>) -> Tally {
+        watch.viewer.painted(frame, part);
+        watch.progress.tile_done(watch.total);
+        taken(memory, 1)
+    }
+}
+
+/// What was counted since the last time.
+fn taken<S: Real>(memory: &mut Memory<S>, done: u64) -> Tally {
+    let work = &mut memory.work;
+    let (rays, counters, paths) = (take(&mut work.rays), take(&mut work.counters), work.take_path_stats());
+    Tally { done, samples: take(&mut memory.traced), rays, counters, paths }
+}
+
+fn lattice(window: Window, tiling: &Tiling, block: u32, start: u32) -> Lattice {
+    Lattice { window, block, edge: tiling.edge(), first: block == start }
+}
+
+/// Whether to stop; remembered in `stopped`.
+fn stop(watch: Watch<'_>, stopped: &AtomicBool) -> bool {
+    let stop = watch.progress.stopped();
+    stopped.fetch_or(stop, Ordering::Relaxed);
+    stop
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}

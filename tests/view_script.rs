@@ -1,0 +1,183 @@
+//! `lanecast view --headless-script`: what a person does in the window, without one.
+
+mod binary;
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use binary::{Ended, SQUARE, files, lanecast, refused};
+use lanecast::film::{Film, exr};
+use serde_json::Value;
+
+/// A folder with the unit square, a scene and a script.
+fn folder(script: &str) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("square.ply"), SQUARE).unwrap();
+    std::fs::write(dir.path().join("script.txt"), script).unwrap();
+    dir
+}
+
+fn view(dir: &Path, line: &str) -> Vec<Value> {
+    let line = format!("view {line} --headless-script script.txt");
+    let Ended { code, out, err } = lanecast(dir, &line.split(' ').collect::<Vec<_>>());
+    assert_eq!(code, Some(0), "{line}: {err}");
+    out.lines().map(|line| serde_json::from_str(line).expect("an object per line")).collect()
+}
+
+fn render(dir: &Path, line: &str) -> Film {
+    let line = format!("render {line} --exact -o plain.exr");
+    let ended = lanecast(dir, &line.split(' ').collect::<Vec<_>>());
+    assert_eq!(ended.code, Some(0), "{line}: {}", ended.err);
+    exr::read(&dir.join("plain.exr")).unwrap()
+}
+
+/// Largest difference of two pictures' colours, and how many pixels differ by more than a hundredth.
+fn apart(a: &Film, b: &Film) -> (f32, usize) {
+    let (a, b) = (a.color().unwrap(), b.color().unwrap());
+    let by_pixel = (0..a[0].len()).map(|i| (0..3).map(|c| (a[c][i] - b[c][i]).abs()).fold(0.0, f32::max));
+    by_pixel.fold((0.0, 0), |(most, many), d| (d.max(most), many + usize::from(d > 0.01)))
+}
+
+#[test]
+fn the_view_is_the_rendered_picture() {
+    let dir = folder("wait\nsave seen.exr\nintegrator normals\nspp 3\nwait\nsave normals.exr\n");
+    let said = view(dir.path(), "builtin:gallery --size 130x75");
+    assert_eq!(said.len(), 2);
+    assert_eq!((&said[0]["command"], &said[0]["complete"]), (&"wait".into(), &true.into()));
+    assert!(said[0]["first_picture_seconds"].as_f64() < said[0]["seconds"].as_f64());
+    for (name, options) in [("seen.exr", ""), ("normals.exr", " --integrator normals --spp 3")] {
+        let want = render(dir.path(), &format!("builtin:gallery --size 130x75{options}"));
+        assert!(exr::read(&dir.path().join(name)).unwrap() == want, "{name}");
+    }
+}
+
+/// Moving by script is looking from there.
+#[test]
+fn moves_lead_where_they_say() {
+    let start = "--eye 0,0,5 --look-at 0,0,0 --up 0,1,0 --fov 60";
+    for (script, eye) in [
+        ("orbit -90 0", "--eye 5,0,0 --look-at 0,0,0 --up 0,1,0 --fov 60"),
+        ("orbit 0 30", "--eye 0,2.5,4.330127018922193 --look-at 0,0,0 --up 0,1,0 --fov 60"),
+        ("zoom 2", "--eye 0,0,2.5 --look-at 0,0,0 --up 0,1,0 --fov 60"),
+        ("fly 0.2 -0.1 0.5", "--eye 1,-0.5,2.5 --look-at 1,-0.5,-2.5 --up 0,1,0 --fov 60"),
+        ("turn 45 0\nturn -45 0\nfov 30", "--eye 0,0,5 --look-at 0,0,0 --up 0,1,0 --fov 30"),
+        ("orbit 10 10\nfly 1 1 1\nreset", start),
+    ] {
+        let dir = folder(&format!("{script}\nwait\nsave seen.exr\n"));
+        view(dir.path(), &format!("builtin:sphere-flake --size 90x60 {start}"));
+        let seen = exr::read(&dir.path().join("seen.exr")).unwrap();
+        let want = render(dir.path(), &format!("builtin:sphere-flake --size 90x60 {eye}"));
+        // Rounding moves edges by less than a pixel: a few of the 5400 may differ.
+        let (_, many) = apart(&seen, &want);
+        assert!(many <= 40, "{script}: {many} pixels differ");
+    }
+}
+
+#[test]
+fn a_click_tells_what_lies_there() {
+    let dir = folder("click 32 32\nclick 0 0\nclick 64 0\n");
+    let said = view(dir.path(), "square.ply --eye 0.5,0.5,2 --look-at 0.5,0.5,0 --fov 90 --size 64x64");
+    let hit = &said[0]["hit"];
+    let near = |value: &Value, want: f64| (value.as_f64().expect("a number") - want).abs() < 1e-6;
+    // The picture is 4 wide at z = 0; the middle of pixel 32 lies half a pixel right of and below the centre.
+    assert!(near(&hit["t"], 2.0) && near(&hit["position"][0], 0.5 + 2.0 / 64.0), "{hit}");
+    assert!(near(&hit["position"][1], 0.5 - 2.0 / 64.0) && near(&hit["position"][2], 0.0), "{hit}");
+    assert!(near(&hit["normal"][2], 1.0) && near(&hit["distance"], (4.0f64 + 2.0 / 1024.0).sqrt()), "{hit}");
+    assert_eq!((&hit["primitive"], &hit["instance"], &hit["material"]), (&0.into(), &0.into(), &"default".into()));
+    assert!(hit["tests"].as_u64() >= Some(1) && hit["leaves"].as_u64() >= Some(1), "{hit}");
+    assert_eq!((&said[1]["hit"], &said[2]["hit"]), (&Value::Null, &Value::Null));
+}
+
+/// A frame of no time shows blocks; heat maps show something; an orbit is timed.
+#[test]
+fn frames_maps_and_orbits() {
+    let script = "blocks 8\nframe 0\nsave frame.exr\nheat nodes\nwait\nsave nodes.exr\nheat lanes\nwait\nsave lanes.exr\n\
+        heat off\nspin 3 5 0\n";
+    let dir = folder(script);
+    let said = view(dir.path(), "builtin:gallery --size 200x120 --threads 1");
+    let commands: Vec<&str> = said.iter().map(|o| o["command"].as_str().unwrap()).collect();
+    assert_eq!(commands, ["frame", "wait", "wait", "spin"]);
+    assert_eq!((&said[0]["complete"], &said[3]["complete_frames"]), (&false.into(), &3.into()));
+    assert!(said[3]["frames_per_second"].as_f64() > Some(0.1));
+    let frame = exr::read(&dir.path().join("frame.exr")).unwrap();
+    let red = frame.f32_plane("R").unwrap();
+    assert!((0..200 * 120).all(|i| red[i] == red[i / 200 / 8 * 8 * 200 + i % 200 / 8 * 8]), "blocks of 8");
+    let [nodes, lanes] = ["nodes.exr", "lanes.exr"].map(|name| exr::read(&dir.path().join(name)).unwrap());
+    for map in [&nodes, &lanes] {
+        let values: std::collections::BTreeSet<_> = map.f32_plane("R").unwrap().iter().map(|r| r.to_bits()).collect();
+        assert!(values.len() >= 3, "{values:?}");
+    }
+    assert!(apart(&nodes, &lanes).1 > 1000);
+}
+
+#[test]
+fn refusals_say_what_is_expected() {
+    let dir = folder("wait\norbit 1\n");
+    let line = "view square.ply --headless-script";
+    let arguments: Vec<&str> = line.split(' ').chain(["script.txt"]).collect();
+    refused(dir.path(), &arguments, "script.txt:2:1: expected `orbit` and RIGHT UP");
+    for (script, what) in [
+        ("camera front", "script.txt:1:1: no camera `front`; there are: none"),
+        ("engine skalar", "script.txt:1:1: no engine `skalar`"),
+        ("integrator normal", "did you mean `normals`?"),
+        ("fov 200", "between 0 and 180"),
+        ("spp 0", "samples per pixel"),
+        ("blocks 3", "16, 8, 4, 2 or 1"),
+        ("save a.png", "nothing to save"),
+        ("wait\nsave a.jpg", "script.txt:2:1: expected a file name that ends in .exr"),
+    ] {
+        std::fs::write(dir.path().join("script.txt"), script).unwrap();
+        let ended = lanecast(dir.path(), &arguments);
+        assert_eq!(ended.code, Some(2), "{script}: {}", ended.err);
+        assert!(ended.err.contains(what) && !ended.err.contains("panicked"), "{script}: {}", ended.err);
+    }
+    let builtin = ["view", "builtin:die", "--headless-script", "script.txt"];
+    std::fs::write(dir.path().join("script.txt"), "reload 1").unwrap();
+    refused(dir.path(), &builtin, "script.txt:1:1: the scene has no file");
+    assert_eq!(files(dir.path()), ["script.txt", "square.ply"]);
+}
+
+const SCENE: &str = "camera \"c\" { eye 0 0 6; look-at 0 0 0; up 0 1 0; fov 40 }\n\
+    difference { box { size 2 2 2 }; sphere radius=RADIUS }\n";
+
+/// Save, and the picture follows; a mistake is told with its place and the last good picture stays; what does not belong to
+/// the scene changes nothing.
+#[test]
+fn an_edit_is_seen() {
+    let script = "wait\nsave a.exr\nreload 30\nsave b.exr\nreload 30\nwait\nsave c.exr\nreload 1\n";
+    let dir = folder(script);
+    let scene = dir.path().join("scene.kdl");
+    let write = |radius: &str| std::fs::write(&scene, SCENE.replace("RADIUS", radius)).unwrap();
+    write("1.2");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
+        .args(["view", "scene.kdl", "--size", "60x50", "--headless-script", "script.txt"])
+        .current_dir(dir.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary");
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut next = || serde_json::from_str::<Value>(&lines.next().expect("a line").unwrap()).unwrap();
+    assert_eq!(next()["command"], "wait");
+    write("1.35");
+    let reload = next();
+    assert_eq!((&reload["changed"], &reload["error"]), (&true.into(), &Value::Null), "{reload}");
+    assert!(reload["save_to_picture_seconds"].as_f64() < Some(20.0), "{reload}");
+    std::fs::write(&scene, SCENE.replace("RADIUS", "1.35 oops=2")).unwrap();
+    let broken = next();
+    let error = broken["error"].as_str().expect("an error");
+    assert!(error.contains("scene.kdl:2:") && error.contains("oops"), "{error}");
+    assert_eq!(next()["complete"], true);
+    // Put right as it was, and a picture saved beside it: the scene is the same.
+    write("1.35");
+    assert_eq!(next()["changed"], false);
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert!(child.wait().unwrap().success(), "{said}");
+    let [a, b, c] = ["a.exr", "b.exr", "c.exr"].map(|name| exr::read(&dir.path().join(name)).unwrap());
+    assert!(apart(&a, &b).1 > 50, "the hole is wider");
+    assert!(b == c, "the last good picture");
+    let want = render(dir.path(), "scene.kdl --size 60x50");
+    assert!(b == want, "the picture after the edit is the rendered one");
+}
