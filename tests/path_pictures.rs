@@ -12,7 +12,6 @@ use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::material::{Alpha, Scattering, TextureRef};
 use lanecast::scene::texture::{Texels, Texture};
 use lanecast::scene::world::{Preset, World};
-use lanecast::shade::Integrator;
 use lanecast::trace::Engines;
 use path_support::{add, dark, lamp, look, parallelogram, paths, picture, plane, scatters, shape, sphere, values};
 

@@ -90,7 +90,7 @@ pub struct RenderArgs {
     /// Mirror reflections followed [default: 4]; scatterings of a path [default: 16]
     #[arg(long, value_name = "N")]
     depth: Option<u32>,
-    /// Print rays and time of each bounce of the paths
+    /// Print rays and time of each bounce or level of recursion
     #[arg(long)]
     stats: bool,
     /// Occlusion rays per hit

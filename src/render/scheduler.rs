@@ -33,7 +33,7 @@ pub struct RenderOutput {
     pub seconds: f64,
     /// What the engine counted; all zero unless counting or costs were asked for.
     pub counters: Counters,
-    /// Where the time of paths went, all threads together.
+    /// Where the time went, level by level, all threads together.
     pub paths: PathStats,
     /// Tiles finished.
     pub tiles_done: u64,
@@ -205,7 +205,7 @@ impl<S: Real> TileMemory<S> {
             samples: if finished { u64::from(sums.count) * sums.pixels.len() as u64 } else { 0 },
             rays: take(&mut work.rays),
             counters: take(&mut work.counters),
-            paths: work.take_path_stats(),
+            paths: take(&mut work.stats),
         }
     }
 }

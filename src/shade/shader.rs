@@ -1,6 +1,7 @@
 //! What integrators share: the first hits of a batch, compact batches of further rays, counts.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use glam::DVec3;
 
@@ -8,9 +9,10 @@ use super::classic::Classic;
 use super::integrator::Integrator;
 use super::look::Looks;
 use super::offset::{offset_origin, position_error};
-use super::path::{PathMemory, PathStats, Paths};
+use super::path::{PathMemory, Paths};
 use super::rt::Rt;
 use super::sample::{RayCounts, Sample};
+use super::stats::{Clock, PathStats};
 use super::through::{Again, Through, number};
 use crate::camera::Camera;
 use crate::camera::sobol::PixelPoints;
@@ -77,6 +79,9 @@ pub struct Workspace<S> {
     pub rays: RayCounts,
     /// What the engine counted, if [`Settings::count`] or [`Settings::cost`] is set.
     pub counters: Counters,
+    /// Where the time went.
+    pub stats: PathStats,
+    pub(super) clock: Clock,
     pub(super) scratch: Scratch,
     pub(super) hits: Hits<S>,
     pub(super) vertices: Vec<Vertex>,
@@ -93,6 +98,8 @@ impl<S: Real> Default for Workspace<S> {
         Self {
             rays: RayCounts::default(),
             counters: Counters::default(),
+            stats: PathStats::default(),
+            clock: Clock::default(),
             scratch: Scratch::default(),
             hits: Hits::new(0),
             vertices: Vec::new(),
@@ -107,9 +114,10 @@ impl<S: Real> Default for Workspace<S> {
 }
 
 impl<S: Real> Workspace<S> {
-    /// Takes what [`Integrator::Path`] counted.
-    pub fn take_path_stats(&mut self) -> PathStats {
-        std::mem::take(&mut self.paths.stats)
+    /// Ends level `level` of recursive ray tracing.
+    pub(super) fn lap(&mut self, level: u32) {
+        let stats = self.clock.lap(&self.rays);
+        self.stats.add(level, &stats);
     }
 }
 
@@ -182,6 +190,7 @@ impl<'a, S: Real> Shader<'a, S> {
     ) {
         out.clear();
         out.resize(rays.len(), Sample::MISS);
+        work.clock.start(&work.rays);
         work.rays.primary += rays.live_count() as u64;
         if let (Integrator::Rt, Some(rt)) = (self.settings.integrator, &self.rt) {
             return self.rt(rt, rays, work, out);
@@ -190,7 +199,9 @@ impl<'a, S: Real> Shader<'a, S> {
             return paths.shade(rays, pixels, sample, work, out);
         }
         if self.settings.cost {
+            let clock = Instant::now();
             self.trace_blocks(rays, work, out);
+            work.clock.tracing += clock.elapsed();
         } else {
             self.intersect(rays, work, |i, layer| self.number(pixels[i], sample, 0, layer));
         }
@@ -219,14 +230,22 @@ impl<'a, S: Real> Shader<'a, S> {
             Integrator::Depth => super::views::depth(out),
             Integrator::Cost => super::views::cost(out),
         }
+        if matches!(
+            self.settings.integrator,
+            Integrator::Ao | Integrator::Normals | Integrator::Depth | Integrator::Cost
+        ) {
+            work.lap(0);
+        }
     }
 
     /// Closest hits of `rays` into `work.hits`. Where surfaces let rays pass by chance, `number` decides for ray `i` at
     /// its layer `k`.
     pub(super) fn intersect(&self, rays: &Rays<S>, work: &mut Workspace<S>, number: impl Fn(usize, u32) -> f64) {
+        let clock = Instant::now();
         let counters = self.settings.count.then_some(&mut work.counters);
         let (hits, scratch, again) = (&mut work.hits, &mut work.scratch, &mut work.again);
         self.through().closest(rays, hits, scratch, again, counters, number);
+        work.clock.tracing += clock.elapsed();
     }
 
     /// The same where every surface counts.
@@ -238,9 +257,11 @@ impl<'a, S: Real> Shader<'a, S> {
     /// Calls `lit` with the number of each ray of `work.batch` that is not occluded, and the share of its light that
     /// arrives; `glass` lets light pass through it.
     pub(super) fn occlude(&self, work: &mut Workspace<S>, glass: bool, mut lit: impl FnMut(usize, DVec3)) {
+        let clock = Instant::now();
         let counters = self.settings.count.then_some(&mut work.counters);
         let (hits, occluded, scratch) = (&mut work.hits, &mut work.occluded, &mut work.scratch);
         let left = self.through().shadows(&work.batch, hits, occluded, scratch, &mut work.again, glass, counters);
+        work.clock.shadowing += clock.elapsed();
         left.iter().enumerate().filter(|(_, left)| **left != DVec3::ZERO).for_each(|(i, left)| lit(i, *left));
     }
 

@@ -52,10 +52,12 @@ impl<S: Real> Shader<'_, S> {
                 self.add_light(light, &vertices, work, out);
             }
             if level == self.settings.depth || vertices.is_empty() {
+                work.lap(level);
                 break;
             }
             next.clear();
             let branches = self.branches(&vertices);
+            work.lap(level);
             self.follow(&branches, pixels, (sample, level + 1), &mut next, work, out);
             std::mem::swap(&mut vertices, &mut next);
         }

@@ -168,7 +168,7 @@ pub(super) fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput
 struct Bounce {
     rays: u64,
     shadow_rays: u64,
-    lane_use: f64,
+    lane_use: Option<f64>,
     trace_seconds: f64,
     shadow_seconds: f64,
     shade_seconds: f64,
@@ -179,7 +179,7 @@ impl Bounce {
         Self {
             rays: stats.rays,
             shadow_rays: stats.shadows,
-            lane_use: stats.points as f64 / stats.lanes.max(1) as f64,
+            lane_use: (stats.lanes > 0).then(|| stats.points as f64 / stats.lanes as f64),
             trace_seconds: stats.tracing.as_secs_f64(),
             shadow_seconds: stats.shadowing.as_secs_f64(),
             shade_seconds: stats.shading.as_secs_f64(),
@@ -187,12 +187,9 @@ impl Bounce {
     }
 }
 
-/// The table of `--stats`: rays by depth, lanes in use while shading, and where the time goes.
+/// The table of `--stats`: rays by depth (bounce of a path, level of recursion), lanes in use while shading, and where the time goes.
 fn bounces(report: &Report<'_>) -> Vec<String> {
     let all = &report.bounces;
-    if all.is_empty() {
-        return vec!["--stats: only paths (--integrator path) are counted bounce by bounce".into()];
-    }
     let sum = |get: fn(&Bounce) -> f64| all.iter().map(get).sum::<f64>();
     let tracing = sum(|b| b.trace_seconds) + sum(|b| b.shadow_seconds);
     let shading = sum(|b| b.shade_seconds);
@@ -201,10 +198,10 @@ fn bounces(report: &Report<'_>) -> Vec<String> {
     let mut lines = vec!["bounce        rays      shadow  lane use  closest %  shadow %  shading %".into()];
     lines.extend(all.iter().enumerate().map(|(i, b)| {
         format!(
-            "{i:>6} {:>11} {:>11} {:>8.1}% {:>9.1} {:>9.1} {:>10.1}",
+            "{i:>6} {:>11} {:>11} {:>9} {:>9.1} {:>9.1} {:>10.1}",
             b.rays,
             b.shadow_rays,
-            100.0 * b.lane_use,
+            b.lane_use.map_or("-".into(), |share| format!("{:.1}%", 100.0 * share)),
             share(b.trace_seconds),
             share(b.shadow_seconds),
             share(b.shade_seconds)

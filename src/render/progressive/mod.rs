@@ -313,7 +313,7 @@ impl<'a, S: Real> Progressive<'a, S> {
 /// What was counted since the last time.
 fn taken<S: Real>(memory: &mut Memory<S>, done: u64) -> Tally {
     let work = &mut memory.work;
-    let (rays, counters, paths) = (take(&mut work.rays), take(&mut work.counters), work.take_path_stats());
+    let (rays, counters, paths) = (take(&mut work.rays), take(&mut work.counters), take(&mut work.stats));
     Tally { done, samples: take(&mut memory.traced), rays, counters, paths }
 }
 

@@ -18,7 +18,6 @@ mod lights;
 mod points;
 mod scatter;
 mod sky;
-mod stats;
 mod wave;
 
 use std::sync::Arc;
@@ -27,7 +26,6 @@ use std::time::Instant;
 use glam::DVec3;
 
 pub(super) use self::bsdf::fresnel;
-pub use self::stats::{BounceStats, PathStats};
 
 use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
@@ -43,6 +41,7 @@ use super::look::{Look, Looks, Model};
 use super::offset::position_error;
 use super::sample::Sample;
 use super::shader::{Settings, Workspace};
+use super::stats::BounceStats;
 use super::through::{Again, MIXTURE, Through, number};
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::{Real, dot};
@@ -77,8 +76,6 @@ pub(super) struct PathMemory<S> {
     next: Wave<S>,
     shadows: Shadows<S>,
     again: Again<S>,
-    /// What was counted.
-    pub stats: PathStats,
 }
 
 impl<S: Real> Default for PathMemory<S> {
@@ -90,7 +87,6 @@ impl<S: Real> Default for PathMemory<S> {
             next: Wave::default(),
             shadows: Shadows::default(),
             again: Again::default(),
-            stats: PathStats::default(),
         }
     }
 }
@@ -184,7 +180,7 @@ impl<'a, S: Real> Paths<'a, S> {
             }
         }
         stats.shadowing = clock.elapsed();
-        memory.stats.add(bounce, &stats);
+        work.stats.add(bounce, &stats);
     }
 
     /// Every model's points in packets; lanes in all packets.
