@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn the_middle_is_ahead_and_x_to_the_right() {
         let texels = Texels::Float(vec![[1.0; 4], [1.0; 4], [f32::NAN; 4], [1.0; 4]]);
-        let texture = Arc::new(Texture { name: String::new(), width: 2, height: 1, texels });
+        let texture = Arc::new(Texture { name: String::new(), width: 4, height: 1, texels });
         let e = Environment { texture, scale: DVec3::ONE, to_world: DMat3::IDENTITY };
         assert_eq!(e.place(DVec3::NEG_Z), [0.5, 0.5]);
         assert_eq!(e.place(DVec3::X * 3.0), [0.75, 0.5]);

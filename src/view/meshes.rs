@@ -16,12 +16,15 @@ const MAX_FILES: usize = 10_000;
 /// When a file was written last, and its length.
 type Stamp = (SystemTime, u64);
 
+/// When the last of several files was written, their number, and their lengths together.
+type Others = (SystemTime, u64, u64);
+
 /// A mesh file as it was read.
 #[derive(Debug)]
 struct Known {
     stamp: Stamp,
-    /// Of a mesh with material libraries and pictures: number and latest change of the files that may be among them.
-    others: Option<Stamp>,
+    /// Of a mesh with material libraries and pictures: what the files look like that may be among them.
+    others: Option<Others>,
     file: MeshFile,
 }
 
@@ -54,12 +57,12 @@ impl Meshes {
     }
 }
 
-/// Latest change and number of the files in the scene's folder, scene files left out; `None` if files outside of it may
+/// Latest change, number and length of the files in the scene's folder, scene files left out; `None` if files outside of it may
 /// count too, or there are too many.
-fn others(references: &References<'_>) -> Option<Stamp> {
+fn others(references: &References<'_>) -> Option<Others> {
     let folder = references.folder.filter(|_| !references.allow_outside)?;
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let (mut latest, mut count) = (SystemTime::UNIX_EPOCH, 0);
+    let (mut latest, mut count, mut bytes) = (SystemTime::UNIX_EPOCH, 0, 0);
     let mut folders = vec![folder.to_path_buf()];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).ok()?.flatten() {
@@ -70,13 +73,15 @@ fn others(references: &References<'_>) -> Option<Stamp> {
             } else if path.extension().is_none_or(|extension| extension != "kdl") {
                 latest = latest.max(meta.modified().ok()?);
                 count += 1;
+                // Clocks of file systems are coarse: two changes may have one time.
+                bytes += meta.len();
             }
             if count > MAX_FILES as u64 || folders.len() > MAX_FILES {
                 return None;
             }
         }
     }
-    Some((latest, count))
+    Some((latest, count, bytes))
 }
 
 #[cfg(test)]

@@ -102,12 +102,14 @@ impl Model {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::material::TextureRef;
+    use crate::scene::material::{TextureRef, Wrap};
 
     fn at(sky: &Texture, direction: DVec3) -> DVec3 {
         let d = direction.normalize();
         let uv = [0.5 + d.x.atan2(-d.z) / (2.0 * PI), d.y.acos() / PI];
-        let [r, g, b, _] = sky.sample(&TextureRef::new(0), uv);
+        // At the zenith the lookup must not reach around to the ground.
+        let lookup = TextureRef { wrap: [Wrap::Repeat, Wrap::Clamp], ..TextureRef::new(0) };
+        let [r, g, b, _] = sky.sample(&lookup, uv);
         DVec3::new(r.into(), g.into(), b.into())
     }
 
