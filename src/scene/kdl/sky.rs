@@ -1,8 +1,8 @@
 //! A clear sky.
 //!
-//! Source: A. J. Preetham, P. Shirley, B. Smits, "A Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix A.2:
-//! luminance and chromaticities by Perez' formula with coefficients that depend on the turbidity. The sun itself is not
-//! in it: a `light sun` is.
+//! Source: A. J. Preetham, P. Shirley, B. Smits, "A Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix
+//! A.2: luminance and chromaticities by Perez' formula with coefficients that depend on the turbidity. The sun itself
+//! is not in it: a `light sun` is.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -102,12 +102,13 @@ impl Model {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::material::TextureRef;
+    use crate::scene::material::{TextureRef, Wrap};
 
     fn at(sky: &Texture, direction: DVec3) -> DVec3 {
         let d = direction.normalize();
         let uv = [0.5 + d.x.atan2(-d.z) / (2.0 * PI), d.y.acos() / PI];
-        let [r, g, b, _] = sky.sample(&TextureRef::new(0), uv);
+        let around = TextureRef { wrap: [Wrap::Repeat, Wrap::Clamp], ..TextureRef::new(0) };
+        let [r, g, b, _] = sky.sample(&around, uv);
         DVec3::new(r.into(), g.into(), b.into())
     }
 
