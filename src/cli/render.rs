@@ -5,7 +5,7 @@ mod report;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use self::report::{Made, report, tell};
+use self::report::{Holds, Made, report, tell};
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
 use super::picture::{Format, Target, target, write};
 use super::preview::{Job, PreviewArgs};
@@ -291,7 +291,9 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
     if output.tiles_done > 0 {
         args.files.iter().try_for_each(|file| write(file, &output.film, &info, args.exposure))?;
     }
-    let made = Made { engine: engine.name(), precision: S::PRECISION, build_seconds: world.stats().build_seconds };
+    let stats = world.stats();
+    let (engine, precision, build_seconds) = (engine.name(), S::PRECISION, stats.build_seconds);
+    let made = Made { engine, precision, build_seconds, holds: Holds::new(&stats, description) };
     tell(args, &report(args, options, &output, &made), &output)?;
     if output.is_complete() { Ok(()) } else { Err(Error::Interrupted) }
 }

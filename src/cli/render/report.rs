@@ -7,6 +7,8 @@ use crate::cli::output::json_to_stdout;
 use crate::error::Result;
 use crate::lanes::compiled_isa;
 use crate::render::{RenderOptions, RenderOutput};
+use crate::scene::description::Description;
+use crate::scene::world::WorldStats;
 use crate::shade::BounceStats;
 
 /// The object of `--json`.
@@ -28,6 +30,7 @@ pub(super) struct Report<'a> {
     complete: bool,
     tiles: (u64, u64),
     rays: Rays,
+    holds: Holds,
     build_seconds: f64,
     seconds: f64,
     mrays_per_s: f64,
@@ -50,6 +53,33 @@ pub(super) struct Made {
     pub engine: &'static str,
     pub precision: &'static str,
     pub build_seconds: f64,
+    pub holds: Holds,
+}
+
+/// What a scene holds in memory.
+#[derive(Clone, Copy, Serialize)]
+pub(super) struct Holds {
+    objects: u64,
+    placements: u64,
+    primitives: u64,
+    instanced_primitives: u64,
+    world_bytes: u64,
+    textures: usize,
+    texture_bytes: u64,
+}
+
+impl Holds {
+    pub fn new(stats: &WorldStats, description: &Description) -> Self {
+        Self {
+            objects: stats.objects,
+            placements: stats.instances,
+            primitives: stats.prims,
+            instanced_primitives: stats.instanced_prims,
+            world_bytes: stats.node_bytes + stats.prim_bytes,
+            textures: description.textures.len(),
+            texture_bytes: description.textures.iter().map(|t| t.bytes()).sum(),
+        }
+    }
 }
 
 /// What `--json` says about a render.
@@ -85,6 +115,7 @@ pub(super) fn report<'a>(
             scattered: rays.scattered,
             total: rays.total(),
         },
+        holds: made.holds,
         build_seconds: made.build_seconds,
         seconds: output.seconds,
         mrays_per_s: rays.total() as f64 / output.seconds.max(f64::MIN_POSITIVE) / 1e6,
@@ -104,6 +135,18 @@ pub(super) fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput
     args.output.say(&format!(
         "{file}: {width}x{height}{part}, {} rays in {:.3} s with {} ({:.1} Mrays/s, shading included)",
         rays.total, report.seconds, report.engine, report.mrays_per_s
+    ));
+    let (h, mib) = (&report.holds, |bytes: u64| bytes as f64 / f64::from(1 << 20));
+    args.output.say(&format!(
+        "the scene holds {} objects placed {} times, {} primitives ({} counting every instance) in {:.1} MiB, {} \
+         textures in {:.1} MiB",
+        h.objects,
+        h.placements,
+        h.primitives,
+        h.instanced_primitives,
+        mib(h.world_bytes),
+        h.textures,
+        mib(h.texture_bytes)
     ));
     args.output.detail(&format!(
         "rays: {} primary, {} shadow, {} occlusion, {} mirror, {} refracted, {} scattered; build {:.3} s",

@@ -99,6 +99,11 @@ impl<S: Real> World<S> {
         self.runs[object as usize].of(prim).material
     }
 
+    /// Number of the part of `object` that primitive `prim` belongs to.
+    pub fn part(&self, object: u32, prim: u32) -> u32 {
+        self.runs[object as usize].of(prim).part
+    }
+
     /// A hit on a triangle whose mesh has no shading normals, for those who compute the rest themselves.
     #[inline]
     pub fn bare_triangle(&self, prim: u32, inst: u32) -> Bare {

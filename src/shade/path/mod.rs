@@ -286,7 +286,9 @@ impl<'a, S: Real> Paths<'a, S> {
         let ns = self.shading_normal(material, &surface, from_front, ng, out_dir);
         if bounce == 0 {
             seen.alpha = 1.0;
-            self.first_hit(org, dir, i, hits, seen);
+            if self.first_hits {
+                self.first_hit(org, dir, i, hits, seen);
+            }
             if self.depth == 0 {
                 return;
             }

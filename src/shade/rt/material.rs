@@ -57,9 +57,9 @@ impl RtMaterial {
         material
     }
 
-    /// Its colour where a pattern's parameters are `uv`.
-    pub fn color(&self, uv: Option<[f64; 2]>) -> DVec3 {
-        self.pattern.as_ref().map_or(self.base, |pattern| pattern.color(uv.unwrap_or_default()))
+    /// Its colour where a pattern's parameters are what `uv` gives.
+    pub fn color(&self, uv: impl FnOnce() -> Option<[f64; 2]>) -> DVec3 {
+        self.pattern.as_ref().map_or(self.base, |pattern| pattern.color(uv().unwrap_or_default()))
     }
 
     /// Corners of the arb that it is, if it has a pattern.
@@ -120,7 +120,7 @@ mod tests {
         assert!(stack.pattern.is_some() && stack.finish.unwrap().shine == 20.0);
         let checker = material("checker a=0/0/150 b=0/0/150");
         assert!(checker.finish.is_none());
-        assert_eq!(checker.color(Some([0.1, 0.9])), DVec3::new(0.0, 0.0, 150.0 / 255.0));
+        assert_eq!(checker.color(|| Some([0.1, 0.9])), DVec3::new(0.0, 0.0, 150.0 / 255.0));
         assert!(material("light").is_light && material("light").finish.is_none());
         assert_eq!(material("camo s=3").finish, Some(PLASTIC));
     }

@@ -99,7 +99,7 @@ enum Found {
     /// Nothing.
     Nothing,
     /// The surface of region so-and-so, from outside.
-    Entering { t: f64, region: u32, position: DVec3, normal: DVec3, uv: Option<[f64; 2]> },
+    Entering { t: f64, region: u32, prim: u32, position: DVec3, normal: DVec3 },
     /// As above, from inside; the normal points out.
     Leaving { t: f64, region: u32, position: DVec3, normal: DVec3 },
 }
@@ -152,10 +152,11 @@ impl<S: Real> Shader<'_, S> {
                         let color = INSIDE.0 * INSIDE.1.powi((MAX_BOUNCES + 1).saturating_sub(path.level) as i32);
                         out[path.pixel as usize].radiance += path.throughput * color;
                     }
-                    Found::Entering { t, region, position, normal, uv } => {
+                    Found::Entering { t, region, prim, position, normal } => {
                         let material = &rt.materials[region as usize];
                         let of_arb = || pattern::uv_of_arb(material.arb()?, position, normal);
-                        let base = material.color(uv.or_else(of_arb));
+                        let part = &self.world.assembly.objects[0].parts[region as usize];
+                        let base = material.color(|| pattern::uv(part, prim, position, normal).or_else(of_arb));
                         meetings.push(Meeting { path: *path, t, position, normal, region, base });
                     }
                 }
@@ -219,14 +220,12 @@ impl<S: Real> Shader<'_, S> {
         let (t, prim, inst) = (hits.t[i].to_f64(), hits.prim[i], hits.inst[i]);
         let (u, v) = (hits.u[i].to_f64(), hits.v[i].to_f64());
         let surface = self.world.surface(org, dir, t, u, v, prim, inst);
-        let parts = &self.world.assembly.objects[self.world.assembly.placements[inst as usize].object as usize].parts;
-        let region = (parts.partition_point(|part| part.first_prim <= prim) - 1) as u32;
+        let region = self.world.part(self.world.assembly.placements[inst as usize].object, prim);
         let (position, normal) = (surface.position, surface.ng);
         if normal.dot(dir) > 0.0 {
             return Found::Leaving { t, region, position, normal };
         }
-        let uv = pattern::uv(&parts[region as usize], prim, position, normal);
-        Found::Entering { t, region, position, normal, uv }
+        Found::Entering { t, region, prim, position, normal }
     }
 }
 
