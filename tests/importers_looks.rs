@@ -41,12 +41,16 @@ fn an_obj_file_brings_its_materials_and_textures() {
     let leaf = png(1, &[[9, 9, 9, 255], [9, 9, 9, 0]]);
     let bumps = png(2, &[[0, 0, 0, 255], [255, 255, 255, 255]]);
     let obj = format!(
-        "mtllib a.mtl sub/b.mtl\n{SQUARE}usemtl floor\n{FACE}usemtl leaf\n{FACE}usemtl nowhere\n{FACE}usemtl lamp\n{FACE}"
+        "mtllib a.mtl sub/b.mtl\n{SQUARE}usemtl floor\n{FACE}usemtl leaf\n{FACE}usemtl nowhere\n{FACE}\
+         usemtl lamp\n{FACE}"
     );
     let folder = folder(&[
         ("m.obj", obj.as_bytes()),
-        ("a.mtl", b"newmtl floor\nKd 0.5 0.25 1\nmap_Kd -s 2 3 -o 0.5 0.25 -clamp on maps\\tiles.png\nbump -bm 25 bumps.png\n\
-                    newmtl unused\nmap_Kd none.png\n"),
+        (
+            "a.mtl",
+            b"newmtl floor\nKd 0.5 0.25 1\nmap_Kd -s 2 3 -o 0.5 0.25 -clamp on maps\\tiles.png\n\
+                    bump -bm 25 bumps.png\nnewmtl unused\nmap_Kd none.png\n",
+        ),
         ("sub/b.mtl", b"newmtl leaf\nmap_d leaf.png\nKs 1\nnewmtl floor\nKd 0\nnewmtl lamp\nKe 5 4 3\nPr 0.5\n"),
         ("maps/tiles.png", &red_green),
         ("leaf.png", &leaf),

@@ -208,6 +208,9 @@ fn what_is_wrong_is_said_where_it_stands() {
         let error = read_in(Some(folder.path()), text).unwrap_err().to_string();
         assert!(error.starts_with(&format!("t.kdl:{place}: ")) && error.contains(phrase), "{text}\n{error}");
     }
+    let many: String = (0..=1 << 18).map(|i| format!("material \"{i}\"\n")).collect();
+    let error = read_in(None, &many).unwrap_err().to_string();
+    assert!(error.starts_with("t.kdl:262145:1: more than 262144 materials"), "{error}");
     let none = read_in(None, "material \"a\" { texture \"a.png\" }").unwrap_err().to_string();
     assert!(none.contains("a scene without a folder refers to no files"), "{none}");
 }

@@ -10,7 +10,8 @@
 //! * Each primitive is stored once; a mesh is a group of its primitives, which the nodes that use it place, as do the
 //!   instances of EXT_mesh_gpu_instancing. Nodes with children are groups.
 //! * Read besides: KHR_mesh_quantization, KHR_lights_punctual, KHR_texture_transform, and of KHR_materials_*:
-//!   emissive_strength, ior, transmission and unlit (as emission). Skins and animations are not read; a warning says so.
+//!   emissive_strength, ior, transmission and unlit (as emission). Skins and animations are not read; a warning says
+//!   so.
 //!
 //! Memory and time: decoded data (vertices, triangles, instances) stay below [`DECODED_PER_BYTE`] bytes per byte of
 //! the document and of the files it refers to, however often the same bytes are named; counts are compared with

@@ -12,7 +12,8 @@ const KINDS: [&str; 4] = ["point", "directional", "spot", "sun"];
 const SUN: f64 = 0.2666;
 
 /// `light point { position ..; intensity .. }`, `light directional { direction ..; irradiance .. }`, `light spot
-/// { position ..; direction ..; intensity ..; inner 20; outer 30 }`, `light sun { direction ..; irradiance ..; angle 1 }`.
+/// { position ..; direction ..; intensity ..; inner 20; outer 30 }`, `light sun { direction ..; irradiance ..;
+/// angle 1 }`.
 ///
 /// # Errors
 /// Other kinds, fields that do not fit.

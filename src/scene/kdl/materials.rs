@@ -34,7 +34,8 @@ pub struct Mix<'n> {
     amount: f64,
 }
 
-/// `material "red" { diffuse ..; plastic roughness=0.2; texture "a.png" }`, number `id` of the scene, and what it mixes.
+/// `material "red" { diffuse ..; plastic roughness=0.2; texture "a.png" }`, number `id` of the scene, and what it
+/// mixes.
 ///
 /// # Errors
 /// Fields that do not fit, reflectances above 1, several models, files that cannot be used.
@@ -238,8 +239,8 @@ fn texture(scope: &Scope<'_>, node: &Node<'_>, material: &mut Material, images: 
     Ok(())
 }
 
-/// Scale, then rotation, then offset of coordinates whose v points up, as scene files have them, for coordinates whose v
-/// points down, as meshes and pictures have them.
+/// Scale, then rotation, then offset of coordinates whose v points up, as scene files have them, for coordinates whose
+/// v points down, as meshes and pictures have them.
 fn transform(fields: &Fields<'_, '_, '_>) -> Result<DAffine2> {
     let pair = |name: &str, absent: f64| match fields.numbers(name)?.as_deref() {
         None => Ok(DVec2::splat(absent)),

@@ -1,11 +1,13 @@
 //! lanecast's own scene format: KDL documents that people write by hand. docs/SCENES.md is its reference.
 //!
 //! A file passes through `source` (text and errors), `syntax` (nodes), then `settings` (cameras), `lights`,
-//! `materials`, `environment`, and `lower` (what is placed where). `fields` reads a statement's values, `expression` computes them.
+//! `materials`, `environment`, and `lower` (what is placed where). `fields` reads a statement's values, `expression`
+//! computes them.
 //!
 //! Bounds on any input: [`MAX_BYTES`] of text, `syntax::MAX_NODES` nodes and values, `syntax::MAX_DEPTH`
-//! nested blocks, `lower::MAX_ITEMS` items after repeats, [`meshes::MAX_GENERATED`] generated triangles, and a
-//! step count on repeats. Measured, the worst documents take under 0.5 GiB (generated meshes at most 1 GiB more).
+//! nested blocks, [`MAX_MATERIALS`], `lower::MAX_ITEMS` items after repeats, [`meshes::MAX_GENERATED`] generated
+//! triangles, and a step count on repeats. Measured, the worst documents take under 0.5 GiB (generated meshes at most
+//! 1 GiB more); pictures have the bounds of [`super::pictures`].
 
 mod cycles;
 mod environment;
@@ -51,6 +53,8 @@ use crate::scene::description::{Description, Group, GroupId};
 
 /// Largest scene file, bytes.
 pub const MAX_BYTES: u64 = 64 << 20;
+/// Most materials of a scene file.
+pub const MAX_MATERIALS: usize = 1 << 18;
 
 /// Statements that may stand once in a document.
 const ONCE: [&str; 6] = ["scene", "units", "precision", "background", "ambient", "environment"];
@@ -153,6 +157,9 @@ fn material<'a, 'n>(
     }
     if lowering.materials.contains_key(name) {
         return Err(lowering.scope.source.error(span, format!("material {} is defined twice", quote(name))));
+    }
+    if materials.len() > MAX_MATERIALS {
+        return Err(lowering.scope.source.error(node.span, format!("more than {MAX_MATERIALS} materials")));
     }
     lowering.materials.insert(name, id);
     materials.push(material);

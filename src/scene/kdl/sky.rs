@@ -1,8 +1,8 @@
 //! A clear sky.
 //!
-//! Source: A. J. Preetham, P. Shirley, B. Smits, "A Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix A.2:
-//! luminance and chromaticities by Perez' formula with coefficients that depend on the turbidity. The sun itself is not
-//! in it: a `light sun` is.
+//! Source: A. J. Preetham, P. Shirley, B. Smits, "A Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix
+//! A.2: luminance and chromaticities by Perez' formula with coefficients that depend on the turbidity. The sun itself
+//! is not in it: a `light sun` is.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -107,9 +107,8 @@ mod tests {
     fn at(sky: &Texture, direction: DVec3) -> DVec3 {
         let d = direction.normalize();
         let uv = [0.5 + d.x.atan2(-d.z) / (2.0 * PI), d.y.acos() / PI];
-        // At the zenith the lookup must not reach around to the ground.
-        let lookup = TextureRef { wrap: [Wrap::Repeat, Wrap::Clamp], ..TextureRef::new(0) };
-        let [r, g, b, _] = sky.sample(&lookup, uv);
+        let around = TextureRef { wrap: [Wrap::Repeat, Wrap::Clamp], ..TextureRef::new(0) };
+        let [r, g, b, _] = sky.sample(&around, uv);
         DVec3::new(r.into(), g.into(), b.into())
     }
 

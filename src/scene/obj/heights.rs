@@ -57,7 +57,7 @@ mod tests {
     fn slopes_tilt_the_normal_downhill() {
         let Texels::Linear8(flat) = normals(&picture([7; 16]), 1.0).texels else { panic!("not numbers") };
         assert!(flat.iter().all(|t| *t == [128, 128, 255, 255]));
-        // Rises to the right by 51 of 255 per texel, two texels apart, over a width of 4: slope 0.008 at 1, so 0.8 at 100.
+        // Rises to the right by 51 of 255 per texel over a width of 4: a slope of 0.008 at 1, of 0.8 at 100.
         let Texels::Linear8(right) = normals(&picture(std::array::from_fn(|i| 51 * (i as u8 % 4))), 100.0).texels
         else {
             panic!("not numbers")

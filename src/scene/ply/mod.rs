@@ -1,11 +1,11 @@
 //! Stanford PLY: text and both binary forms.
 //!
 //! Source: Greg Turk, "The PLY Polygon File Format", 1994. Read are the element `vertex` (`x`, `y`, `z` of any
-//! scalar type, in any order; `nx`, `ny`, `nz` as shading normals; `u`, `v` or `s`, `t` or `texture_u`, `texture_v` as texture
-//! coordinates), the element `face` (the list `vertex_indices` or `vertex_index`, of any types,
-//! polygons fanned in place) and the element `tristrips` (the same list; -1 starts a new strip, every second
-//! triangle is turned so that all keep the winding of the first). Other properties and elements are passed over.
-//! Values keep their declared type: a text number of a `float` property is rounded to f32.
+//! scalar type, in any order; `nx`, `ny`, `nz` as shading normals; `u`, `v` or `s`, `t` or `texture_u`, `texture_v` as
+//! texture coordinates), the element `face` (the list `vertex_indices` or `vertex_index`, of any types, polygons fanned
+//! in place) and the element `tristrips` (the same list; -1 starts a new strip, every second triangle is turned so that
+//! all keep the winding of the first). Other properties and elements are passed over. Values keep their declared type:
+//! a text number of a `float` property is rounded to f32.
 //!
 //! The header's counts are compared with the length of the file before anything is allocated. Memory stays below
 //! 40 bytes per byte of the file.
