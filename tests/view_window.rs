@@ -65,7 +65,6 @@ impl Person {
     fn sit_down(display: &Display, dir: &Path, arguments: &str) -> Self {
         let size = format!("{WIDTH}x{HEIGHT}");
         let child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
-            .arg("view")
             .args(arguments.split(' '))
             .args(["--size", &size])
             .current_dir(dir)
@@ -140,6 +139,20 @@ impl Person {
         self.send(KEY_RELEASE_EVENT, code, 0, 0);
     }
 
+    /// q quits.
+    fn quits(&mut self) {
+        self.key(0x71);
+        let start = Instant::now();
+        let status = loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                break status;
+            }
+            assert!(start.elapsed() < PATIENCE, "q does not quit");
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        assert_eq!(status.code(), Some(0), "{}", self.said());
+    }
+
     fn drag(&self, from: (i16, i16), to: (i16, i16)) {
         self.send(MOTION_NOTIFY_EVENT, 0, from.0, from.1);
         // The window must have seen the pointer before the button.
@@ -189,7 +202,7 @@ fn the_window_shows_what_is_rendered_and_follows_keys_pointer_and_edits() {
         std::fs::write(aside.path().join("scene.kdl"), &text).unwrap();
     };
     write("1.2");
-    let mut person = Person::sit_down(&display, dir.path(), "scene.kdl");
+    let mut person = Person::sit_down(&display, dir.path(), "view scene.kdl");
     let start = scripted(aside.path(), "scene.kdl", "");
     let rendered = lanecast(aside.path(), &["render", "scene.kdl", "-o", "r.exr", "--size", "180x120", "--exact"]);
     assert_eq!(rendered.code, Some(0), "{}", rendered.err);
@@ -233,19 +246,39 @@ fn the_window_shows_what_is_rendered_and_follows_keys_pointer_and_edits() {
     });
     person.sees("the last good picture", &edited, rows);
 
-    // q quits.
-    person.key(0x71);
-    let start = Instant::now();
-    let status = loop {
-        if let Some(status) = person.child.try_wait().unwrap() {
-            break status;
-        }
-        assert!(start.elapsed() < PATIENCE, "q does not quit");
-        std::thread::sleep(Duration::from_millis(20));
-    };
-    assert_eq!(status.code(), Some(0), "{}", person.said());
+    person.quits();
     let png = lanecast::film::png::read(&saved).unwrap();
     assert_eq!((png.width, png.height), (WIDTH, HEIGHT));
+}
+
+/// `render --preview window` shows what it writes and stays until it is closed.
+#[test]
+fn a_render_can_be_watched() {
+    let Some(display) = Display::start() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let mut person = Person::sit_down(&display, dir.path(), "render builtin:die -o out.exr --preview window");
+    let file = dir.path().join("out.exr");
+    person.until("the file", |_| file.exists().then_some(()));
+    let want = levels(&exr::read(&file).unwrap());
+    person.sees("the picture that was written", &want, 0);
+    person.quits();
+}
+
+#[test]
+fn without_a_display_a_render_goes_on_and_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_lanecast"))
+        .args(["render", "builtin:die", "-o", "out.png", "--size", "20x20", "--preview", "window"])
+        .current_dir(dir.path())
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .output()
+        .expect("the binary");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("preview: no window") && said.contains("going on without"), "{said}");
+    assert!(dir.path().join("out.png").exists());
 }
 
 #[test]

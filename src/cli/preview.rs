@@ -12,6 +12,7 @@ use crate::scene::world::World;
 use crate::trace::{Engine, Engines};
 use crate::view::term::Terminal;
 use crate::view::tev::{DEFAULT_ADDRESS, Tev};
+use crate::view::window::live::Live;
 
 /// Values of `--preview`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,6 +21,8 @@ pub enum Preview {
     Off,
     /// The terminal.
     Term,
+    /// A window, which stays until it is closed.
+    Window,
     /// The viewer tev at an address.
     Tev(String),
 }
@@ -27,7 +30,8 @@ pub enum Preview {
 /// How a picture appears.
 #[derive(Clone, Debug, clap::Args)]
 pub struct PreviewArgs {
-    /// Show the picture while it is made: off, term (in the terminal) or tev[:HOST:PORT] (in the viewer tev)
+    /// Show the picture while it is made: off, term (in the terminal), window (stays until it is closed)
+    /// or tev[:HOST:PORT] (in the viewer tev)
     #[arg(long, value_name = "WHERE", default_value = "off", value_parser = preview, help_heading = "Output")]
     preview: Preview,
     /// Make the picture appear as blocks, first of this many pixels on a side: 16, 8, 4, 2 or 1 [default with --preview: 16]
@@ -63,26 +67,46 @@ pub(super) struct Job<'a, S: Engines> {
 }
 
 impl<S: Engines> Job<'_, S> {
-    /// Renders, shown as `how` says. A place where nothing can be shown is a line on stderr, and the render goes on.
+    /// Renders, shown as `how` says. A place where nothing can be shown is a line on stderr, and the render goes on. A
+    /// window that was opened comes back with the picture.
     ///
     /// # Errors
     /// Options out of range.
-    pub fn render(&self, how: &PreviewArgs, progress: &dyn Progress) -> Result<RenderOutput> {
+    pub fn render(&self, how: &PreviewArgs, progress: &dyn Progress) -> Result<(RenderOutput, Option<Live>)> {
         let Self { engine, world, description, camera, options, .. } = *self;
         if !how.by_blocks() {
-            return render_with(engine, world, description, camera, options, progress);
+            return Ok((render_with(engine, world, description, camera, options, progress)?, None));
         }
         let start = how.blocks.unwrap_or(LARGEST_BLOCK);
         let picture = Progressive::new(engine, world, description, camera, options, start)?;
-        Ok(match &how.preview {
+        if how.preview == Preview::Window {
+            return Ok(self.in_window(picture, progress));
+        }
+        let output = match &how.preview {
             Preview::Term if io::stderr().is_terminal() => self.in_terminal(picture, progress),
             Preview::Term => {
                 self.output.say("preview: stderr is no terminal; going on without");
                 unseen(picture, progress)
             }
             Preview::Tev(address) => self.in_tev(picture, address, progress),
-            Preview::Off => unseen(picture, progress),
-        })
+            Preview::Off | Preview::Window => unseen(picture, progress),
+        };
+        Ok((output, None))
+    }
+
+    fn in_window(&self, mut picture: Progressive<'_, S>, progress: &dyn Progress) -> (RenderOutput, Option<Live>) {
+        match Live::open(self.name, (self.options.width, self.options.height), self.exposure) {
+            Ok(window) => {
+                picture.run(progress, &window);
+                let output = picture.finish();
+                window.finish(&output.film);
+                (output, Some(window))
+            }
+            Err(error) => {
+                self.output.say(&format!("preview: no window: {error}; going on without"));
+                (unseen(picture, progress), None)
+            }
+        }
     }
 
     fn in_terminal(&self, mut picture: Progressive<'_, S>, progress: &dyn Progress) -> RenderOutput {
@@ -135,9 +159,10 @@ fn preview(text: &str) -> std::result::Result<Preview, String> {
     match text.split_once(':') {
         None if text == "off" => Ok(Preview::Off),
         None if text == "term" => Ok(Preview::Term),
+        None if text == "window" => Ok(Preview::Window),
         None if text == "tev" => Ok(Preview::Tev(DEFAULT_ADDRESS.into())),
         Some(("tev", address)) if is_address(address) => Ok(Preview::Tev(address.into())),
-        _ => Err("expected off, term, tev or tev:HOST:PORT, for example tev:127.0.0.1:14158".into()),
+        _ => Err("expected off, term, window, tev or tev:HOST:PORT, for example tev:127.0.0.1:14158".into()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! `lanecast render`: a picture of a scene.
 
+mod frames;
 mod report;
 
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
 use crate::render::{Aov, Progress, RenderOptions};
 use crate::scene::description::{Description, Precision};
+use crate::scene::load::{ReadMesh, read_mesh};
 use crate::scene::world::World;
 use crate::shade::{Integrator, unknown_shaders};
 use crate::trace::Engines;
@@ -47,13 +49,14 @@ Examples:
   lanecast render moss.asc --top all.g --view moss.rt --rt-compat --size 512x512 -o moss.pix
   lanecast render m35.asc --az 90 --el 0 --lenient -o front.png
   lanecast render builtin:forest -o forest.exr --spp 64 --preview tev
+  lanecast render turn.kdl -o turn.exr --frames 1..48 --resume
 
 The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as
 float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy), .pix (BRL-CAD's: linear,
 8 bits, no header). Ctrl-C writes the finished tiles and exits with 130.";
 
 /// Arguments of `lanecast render`.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct RenderArgs {
     #[command(flatten)]
@@ -111,6 +114,13 @@ pub struct RenderArgs {
     /// Tile edge: 8, 16 or 32 pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 32)]
     tile: u32,
+    /// Frames of an animation, both ends included: the scene's parameter `frame` is set to each, and NAME.0001.exr and so
+    /// on are written; a frame that is stopped is not
+    #[arg(long, value_name = "A..B", value_parser = frames::frames)]
+    frames: Option<frames::Frames>,
+    /// Leave out frames whose files exist
+    #[arg(long, requires = "frames")]
+    resume: bool,
     #[command(flatten)]
     preview: PreviewArgs,
     #[command(flatten)]
@@ -163,6 +173,8 @@ impl RenderArgs {
             exposure: 0.0,
             engine: EngineArgs::default(),
             tile: 32,
+            frames: None,
+            resume: false,
             preview: PreviewArgs::default(),
             threads,
             output: OutputArgs::default(),
@@ -176,6 +188,9 @@ impl RenderArgs {
 /// Bad input or options, an output that cannot be written; [`Error::Interrupted`] after Ctrl-C, when the finished
 /// tiles have been written.
 pub fn run(args: &RenderArgs) -> Result<()> {
+    if let Some(frames) = args.frames {
+        return frames::run(args, frames);
+    }
     let options = options(args)?;
     let description = load(args)?;
     for warning in &description.warnings {
@@ -185,18 +200,29 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         check_rt(args, &description)?;
     }
     with_pool(args.threads.count(), || match args.scene.options.precision(&description) {
-        Precision::F32 => picture::<f32>(args, &description, &options),
-        Precision::F64 => picture::<f64>(args, &description, &options),
+        Precision::F32 => compiled::<f32>(args, &description, &options),
+        Precision::F64 => compiled::<f64>(args, &description, &options),
     })
+}
+
+fn compiled<S: Engines>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
+    args.engine.find::<S>()?;
+    let world = World::<S>::compile(description, args.scene.options.preset())?;
+    picture(args, description, options, &world, true)
 }
 
 /// The scene; of a database the objects that the view script names, unless `--top` names some.
 fn load(args: &RenderArgs) -> Result<Description> {
+    load_with(args, &read_mesh)
+}
+
+/// The same with meshes read by `read`.
+fn load_with(args: &RenderArgs, read: &ReadMesh<'_>) -> Result<Description> {
     let mut scene = args.scene.clone();
     if scene.options.top.is_empty() && !scene.scene.starts_with("builtin:") {
         scene.options.top = args.camera.script()?.map(|view| view.tops).unwrap_or_default();
     }
-    scene.load()
+    scene.options.load_with(&scene.scene, read)
 }
 
 /// Whether `rt`'s lighting model knows all that the scene asks of it.
@@ -253,16 +279,22 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
     Ok(options)
 }
 
-fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
+/// Renders and writes one picture. If `partly`, also one that was stopped, as far as it got.
+fn picture<S: Engines>(
+    args: &RenderArgs,
+    description: &Description,
+    options: &RenderOptions,
+    world: &World<S>,
+    partly: bool,
+) -> Result<()> {
     let engine = args.engine.for_blocks(args.preview.by_blocks()).find::<S>()?;
-    let world = World::<S>::compile(description, args.scene.options.preset())?;
     let (width, height) = (options.width, options.height);
     let camera_args = if args.rt_compat { args.camera.or_default_view() } else { args.camera.clone() };
     let camera = camera_args.ready(description, world.bounds(), (width, height))?;
     let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
     let job = Job {
         engine,
-        world: &world,
+        world,
         description,
         camera: &camera,
         options,
@@ -270,7 +302,7 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
         name: &args.file(),
         output: &args.output,
     };
-    let output = job.render(&args.preview, &watch)?;
+    let (output, window) = job.render(&args.preview, &watch)?;
     watch.bar.finish_and_clear();
     let info = ImageInfo {
         software: concat!("lanecast ", env!("CARGO_PKG_VERSION")).into(),
@@ -288,13 +320,16 @@ fn picture<S: Engines>(args: &RenderArgs, description: &Description, options: &R
         world_to_ndc: Some(camera.world_to_ndc().transpose().to_cols_array_2d()),
     };
     // Without a finished tile there is nothing to show, and an older picture is worth more.
-    if output.tiles_done > 0 {
+    if output.is_complete() || partly && output.tiles_done > 0 {
         args.files.iter().try_for_each(|file| write(file, &output.film, &info, args.exposure))?;
     }
     let stats = world.stats();
     let (engine, precision, build_seconds) = (engine.name(), S::PRECISION, stats.build_seconds);
     let made = Made { engine, precision, build_seconds, holds: Holds::new(&stats, description) };
     tell(args, &report(args, options, &output, &made), &output)?;
+    if let Some(window) = window {
+        window.wait(|| watch.stopped());
+    }
     if output.is_complete() { Ok(()) } else { Err(Error::Interrupted) }
 }
 

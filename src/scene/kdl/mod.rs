@@ -16,6 +16,7 @@ mod fields;
 mod flake;
 mod hash;
 mod images;
+mod keys;
 mod lights;
 mod lower;
 mod materials;
@@ -35,6 +36,8 @@ mod tests;
 mod token;
 mod transform;
 mod twig;
+
+pub use keys::FRAME;
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -88,6 +91,7 @@ pub fn parse(
         item_count: 0,
         camera_names: HashSet::new(),
     };
+    keys::define_frame(&mut lowering.scope, &nodes, set)?;
     for node in nodes.iter().filter(|n| n.name == "parameter") {
         settings::parameter(&mut lowering.scope, node, set)?;
     }

@@ -82,14 +82,30 @@ pub fn only_colour(scope: &Scope<'_>, node: &Node<'_>) -> Result<DVec3> {
     colour_from(&numbers, f64::INFINITY).map_err(|what| fields.error(format!("`{}` {what}", node.name)))
 }
 
-/// `parameter radius 1.5`, unless `set` gives another value: defines the name in `scope`.
+/// What a parameter must say.
+pub const NO_NUMBER: &str = "expected `parameter name value` or `parameter name { key FRAME VALUE; ... }`";
+
+/// The value that `set` gives to `name`.
+///
+/// # Errors
+/// A value that is no number or expression.
+pub fn set_value(scope: &Scope<'_>, name: &str, set: &[(String, String)]) -> Result<Option<f64>> {
+    let Some((_, text)) = set.iter().rev().find(|(n, _)| n == name) else { return Ok(None) };
+    let value = super::expression::evaluate(text, scope);
+    value.map(Some).map_err(|fault| Error::Usage(format!("--set {name}={text}: {}", fault.what)))
+}
+
+/// `parameter radius 1.5` or `parameter radius { key FRAME VALUE; ... }`, unless `set` gives another value: defines the
+/// name in `scope`.
 ///
 /// # Errors
 /// Names that are taken or not names, values that are not one number.
 pub fn parameter(scope: &mut Scope<'_>, node: &Node<'_>, set: &[(String, String)]) -> Result<()> {
-    let fields = Fields::collect(scope, node, &[], NO_REST)?;
-    let [name_entry, value] = node.entries.as_slice() else {
-        return Err(fields.error("expected `parameter name value`"));
+    let fields = Fields::collect(scope, node, &[], &["key"])?;
+    let (name_entry, value) = match (node.entries.as_slice(), fields.rest.is_empty()) {
+        ([name, value], true) => (name, Some(value)),
+        ([name], false) => (name, None),
+        _ => return Err(fields.error(NO_NUMBER)),
     };
     let Value::Text(name) = &name_entry.value else {
         return Err(scope.source.error(name_entry.span, "expected the parameter's name"));
@@ -104,14 +120,14 @@ pub fn parameter(scope: &mut Scope<'_>, node: &Node<'_>, set: &[(String, String)
     if scope.parameters.contains_key(name.as_ref()) {
         return Err(scope.source.error(name_entry.span, format!("parameter {} is defined twice", quote(name))));
     }
-    let numbers = numbers_of(scope, std::slice::from_ref(value))?;
-    let &[mut number] = numbers.as_slice() else {
-        return Err(scope.source.error(value.span, "a parameter has one value"));
+    let number = match value {
+        None => super::keys::value(scope, node)?,
+        Some(value) => match numbers_of(scope, std::slice::from_ref(value))?.as_slice() {
+            &[number] => number,
+            _ => return Err(scope.source.error(value.span, "a parameter has one value")),
+        },
     };
-    if let Some((_, text)) = set.iter().rev().find(|(n, _)| n == name) {
-        number = super::expression::evaluate(text, scope)
-            .map_err(|fault| Error::Usage(format!("--set {name}={text}: {}", fault.what)))?;
-    }
+    let number = set_value(scope, name, set)?.unwrap_or(number);
     scope.parameters.insert(name.to_string(), number);
     Ok(())
 }
@@ -122,7 +138,7 @@ pub fn parameter(scope: &mut Scope<'_>, node: &Node<'_>, set: &[(String, String)
 /// The first such name, with the names there are.
 pub fn check_set(scope: &Scope<'_>, set: &[(String, String)]) -> Result<()> {
     let Some((name, _)) = set.iter().find(|(n, _)| !scope.parameters.contains_key(n)) else { return Ok(()) };
-    let names: Vec<&str> = scope.parameters.keys().map(String::as_str).collect();
+    let names: Vec<&str> = scope.parameters.keys().map(String::as_str).filter(|n| *n != super::keys::FRAME).collect();
     let file = scope.source.file.display();
     let mut what = format!("--set {name}: {file} has no parameter {}", quote(name));
     match near(name, names.iter().copied()) {

@@ -1,6 +1,7 @@
 //! A native window to walk around in a scene.
 
 mod input;
+pub mod live;
 mod screen;
 mod worker;
 

@@ -1,0 +1,106 @@
+//! `render --frames A..B`: the pictures of an animation, one file per frame.
+
+use std::path::{Path, PathBuf};
+
+use super::{RenderArgs, check_rt, load_with, options, picture};
+use crate::cli::common::with_pool;
+use crate::error::{Error, Result};
+use crate::scene::description::{Description, Precision};
+use crate::scene::kdl::FRAME;
+use crate::scene::world::World;
+use crate::trace::Engines;
+use crate::view::meshes::Meshes;
+
+/// Largest frame number.
+const MAX_FRAME: u32 = 999_999;
+
+/// Frames from the first to the last one, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    first: u32,
+    last: u32,
+}
+
+/// Parses `A..B`.
+pub(super) fn frames(text: &str) -> std::result::Result<Frames, String> {
+    let number = |s: &str| s.parse().ok().filter(|n: &u32| *n <= MAX_FRAME);
+    let ends = text.split_once("..").and_then(|(a, b)| Some((number(a)?, number(b)?)));
+    match ends {
+        Some((first, last)) if first <= last => Ok(Frames { first, last }),
+        _ => Err(format!("expected A..B with 0 <= A <= B <= {MAX_FRAME}, for example 1..48 (48 frames)")),
+    }
+}
+
+/// `out.exr` and frame 7 give `out.0007.exr`.
+fn numbered(path: &Path, frame: u32) -> PathBuf {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    path.with_extension(format!("{frame:04}.{extension}"))
+}
+
+/// Renders all frames. Meshes are read once, and objects that do not change from one frame to the next are built once.
+///
+/// # Errors
+/// As [`super::run`]; a frame that is stopped is not written.
+pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
+    let options = options(args)?;
+    let meshes = Meshes::default();
+    let describe = |frame: u32| {
+        let mut of_frame = RenderArgs { frames: None, ..args.clone() };
+        of_frame.files.iter_mut().for_each(|file| file.path = numbered(&file.path, frame));
+        of_frame.scene.options.set.push((FRAME.into(), frame.to_string()));
+        let description = load_with(&of_frame, &|path, references| meshes.read(path, references))?;
+        Ok::<_, Error>((of_frame, description))
+    };
+    let is_wanted = |frame: &u32| {
+        let is_there = args.resume && args.files.iter().all(|file| numbered(&file.path, *frame).exists());
+        if is_there {
+            args.output.say(&format!("{}: there already", numbered(Path::new(&args.file()), *frame).display()));
+        }
+        !is_there
+    };
+    let mut wanted = (frames.first..=frames.last).filter(is_wanted);
+    let Some(first) = wanted.next() else { return Ok(()) };
+    let (of_first, description) = describe(first)?;
+    description.warnings.iter().for_each(|warning| args.output.say(&format!("warning: {warning}")));
+    if options.integrator == crate::shade::Integrator::Rt {
+        check_rt(args, &description)?;
+    }
+    let rest = wanted.map(describe);
+    with_pool(args.threads.count(), || match args.scene.options.precision(&description) {
+        Precision::F32 => all::<f32>((of_first, description), rest, &options),
+        Precision::F64 => all::<f64>((of_first, description), rest, &options),
+    })
+}
+
+type Frame = (RenderArgs, Description);
+
+fn all<S: Engines>(
+    first: Frame,
+    rest: impl Iterator<Item = Result<Frame>>,
+    options: &crate::render::RenderOptions,
+) -> Result<()> {
+    let mut before: Option<World<S>> = None;
+    for frame in std::iter::once(Ok(first)).chain(rest) {
+        let (args, description) = frame?;
+        let world = World::<S>::compile_after(&description, args.scene.options.preset(), before.as_ref())?;
+        picture(&args, &description, options, &world, false)?;
+        before = Some(world);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_parse_or_say_what_is_expected() {
+        assert_eq!(frames("1..48"), Ok(Frames { first: 1, last: 48 }));
+        assert_eq!(frames("7..7"), Ok(Frames { first: 7, last: 7 }));
+        for wrong in ["", "3", "..", "5..4", "-1..4", "1..1000000", "1...4"] {
+            assert!(frames(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(numbered(Path::new("d/out.exr"), 7), Path::new("d/out.0007.exr"));
+        assert_eq!(numbered(Path::new("a.b.png"), 12345), Path::new("a.b.12345.png"));
+    }
+}
