@@ -27,7 +27,7 @@ fn a_square_is_where_it_should_be_with_all_planes_in_exr() {
     assert_eq!((&report["complete"], &report["rays"]["primary"]), (&true.into(), &4096.into()));
     assert_eq!(files(dir.path()), ["out.exr", "square.ply"]);
     let film = exr::read(&dir.path().join("out.exr")).expect("an EXR file");
-    assert_eq!(film.planes.len(), 4 + 1 + 3 + 3 + 1 + 1 + 1);
+    assert_eq!(film.planes.len(), 4 + (1 + 3 + 3 + 1 + 1 + 1) + (3 + 3 + 3 + 3 + 1 + 1 + 1));
     let (alpha, z) = (film.f32_plane("A").expect("A"), film.f32_plane("Z").expect("Z"));
     for (i, (&a, &z)) in alpha.iter().zip(z).enumerate() {
         // The square covers the middle quarter each way: pixels 24 to 39.
