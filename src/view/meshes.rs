@@ -20,8 +20,8 @@ type Stamp = (SystemTime, u64);
 #[derive(Debug)]
 struct Known {
     stamp: Stamp,
-    /// Of a mesh with material libraries and pictures: number and latest change of the files that may be among them.
-    others: Option<Stamp>,
+    /// Of a mesh with material libraries and pictures: number, latest change and bytes of the files that may be among them.
+    others: Option<(u64, Stamp)>,
     file: MeshFile,
 }
 
@@ -54,12 +54,12 @@ impl Meshes {
     }
 }
 
-/// Latest change and number of the files in the scene's folder, scene files left out; `None` if files outside of it may
+/// Number, latest change and bytes of the files in the scene's folder, scene files left out; `None` if files outside of it may
 /// count too, or there are too many.
-fn others(references: &References<'_>) -> Option<Stamp> {
+fn others(references: &References<'_>) -> Option<(u64, Stamp)> {
     let folder = references.folder.filter(|_| !references.allow_outside)?;
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let (mut latest, mut count) = (SystemTime::UNIX_EPOCH, 0);
+    let (mut latest, mut count, mut bytes) = (SystemTime::UNIX_EPOCH, 0, 0_u64);
     let mut folders = vec![folder.to_path_buf()];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).ok()?.flatten() {
@@ -70,13 +70,14 @@ fn others(references: &References<'_>) -> Option<Stamp> {
             } else if path.extension().is_none_or(|extension| extension != "kdl") {
                 latest = latest.max(meta.modified().ok()?);
                 count += 1;
+                bytes = bytes.wrapping_add(meta.len());
             }
             if count > MAX_FILES as u64 || folders.len() > MAX_FILES {
                 return None;
             }
         }
     }
-    Some((latest, count))
+    Some((count, (latest, bytes)))
 }
 
 #[cfg(test)]
