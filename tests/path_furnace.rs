@@ -101,7 +101,8 @@ fn glass_boundaries_show_what_they_mirror_and_let_through() {
     }
 }
 
-/// Bodies of clear glass keep all light: they cannot be seen. Long paths, and the chance that ends them, are part of it.
+/// Bodies of clear glass keep all light: they cannot be seen. Long paths, and the chance that ends them, are part of
+/// it.
 #[test]
 fn clear_glass_is_invisible() {
     for scattering in [

@@ -121,7 +121,7 @@ fn pictures_agree_with_mitsuba() {
                     worst = worst.max(off.abs());
                     if off.abs() > CLOSE {
                         failures.push(format!(
-                            "{name}, region {column},{row}, colour {c}: {f:.6}, Mitsuba {w:.6} ({:.2} %, noise {:.2} %)",
+                            "{name}, {column},{row}, colour {c}: {f:.6}, Mitsuba {w:.6} ({:.2} %, noise {:.2} %)",
                             100.0 * off,
                             100.0 * noise
                         ));

@@ -189,6 +189,24 @@ fn seen_by_its_camera<S: Engines>(d: &Description, options: &RenderOptions) -> R
     render(&world, d, &Camera::new(&described, 1.5).unwrap(), options, &Silent).unwrap()
 }
 
+/// A mixture's albedo is that of what it shows; its number is its own.
+#[test]
+fn mixtures_have_the_albedo_of_their_parts() {
+    let mut d = dark();
+    let first = add(&mut d, Material { diffuse: DVec3::new(0.2, 0.4, 0.6), ..Material::default() });
+    let second = add(&mut d, Material { diffuse: DVec3::new(0.9, 0.1, 0.5), ..Material::default() });
+    let mixture = add(&mut d, scatters(Scattering::Mix { first, second, amount: 0.25 }, DVec3::ZERO));
+    plane(&mut d, 0.0, mixture);
+    let options = RenderOptions { aovs: Aov::ALL.to_vec(), ..paths(8, 256, 2) };
+    let film = picture::<f32>(&d, &look(DVec3::Z * 4.0, DVec3::ZERO, 0.1), &options).film;
+    let want = d.materials[first as usize].diffuse * 0.75 + d.materials[second as usize].diffuse * 0.25;
+    for (plane, want) in ["albedo.R", "albedo.G", "albedo.B"].into_iter().zip(want.to_array()) {
+        let mean = values(&film, plane).iter().map(|&x| f64::from(x)).sum::<f64>() / 64.0;
+        assert!((mean - want).abs() < 0.01, "{plane}: {mean}, want {want}");
+    }
+    assert!(film.u32_plane("id.material").unwrap().iter().all(|&id| id == mixture));
+}
+
 /// Materials and lights at the ends of their ranges, one after the other.
 #[test]
 fn extremes_give_finite_pictures() {

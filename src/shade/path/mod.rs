@@ -250,7 +250,7 @@ impl<'a, S: Real> Paths<'a, S> {
                 if bounce == 0 {
                     seen.alpha = 1.0;
                     if self.first_hits {
-                        self.first_hit(org, dir, i, hits, seen);
+                        self.first_hit(org, dir, i, hits, bare.material, seen);
                     }
                 }
                 let fields = raw_fields(wave, i, hits, &triangle, look);
@@ -283,7 +283,7 @@ impl<'a, S: Real> Paths<'a, S> {
         if bounce == 0 {
             seen.alpha = 1.0;
             if self.first_hits {
-                self.first_hit(org, dir, i, hits, seen);
+                self.first_hit(org, dir, i, hits, material, seen);
             }
             if self.depth == 0 {
                 return;
@@ -309,19 +309,18 @@ impl<'a, S: Real> Paths<'a, S> {
         memory.points[look.model as usize].push(path, &fields, false);
     }
 
-    /// What pictures show of the first hit, besides radiance.
-    fn first_hit(&self, org: DVec3, dir: DVec3, i: usize, hits: &Hits<S>, seen: &mut Sample) {
+    /// What pictures show of the first hit, besides radiance; a mixture has been resolved to `material`.
+    fn first_hit(&self, org: DVec3, dir: DVec3, i: usize, hits: &Hits<S>, material: u32, seen: &mut Sample) {
         let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
         let surface = self.world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);
         let from_front = surface.ng.dot(dir) <= 0.0;
         let ng = if from_front { surface.ng } else { -surface.ng };
-        let material = surface.material;
         seen.distance = t * dir.length();
         seen.position = surface.position;
         seen.normal = ng;
         seen.shading_normal = self.shading_normal(material, &surface, from_front, ng, -dir.normalize_or_zero());
         seen.albedo = self.looks.look(material, &surface, from_front).base;
-        (seen.inst, seen.prim, seen.material) = (hits.inst[i], hits.prim[i], material);
+        (seen.inst, seen.prim, seen.material) = (hits.inst[i], hits.prim[i], surface.material);
     }
 
     /// The shading normal on the side of `ng`; `ng` itself where `out` is behind it.
