@@ -251,7 +251,7 @@ fn extremes_give_finite_pictures() {
 #[test]
 fn textures_are_where_their_coordinates_say() {
     let mut d = dark();
-    let texel = |i: u32| [if i % 2 == 0 { 0.25 } else { 0.75 }, if i < 2 { 0.5 } else { 1.0 }, 0.0, 1.0];
+    let texel = |i: u32| [if i.is_multiple_of(2) { 0.25 } else { 0.75 }, if i < 2 { 0.5 } else { 1.0 }, 0.0, 1.0];
     let texels = Texels::Float((0..4).map(texel).collect());
     d.textures.push(Texture { name: "four".into(), width: 2, height: 2, texels }.into());
     let mut material = Material { diffuse: DVec3::ONE, ..Material::default() };
