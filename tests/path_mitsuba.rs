@@ -1,6 +1,7 @@
 //! Paths against Mitsuba 3: the scenes of tests/mitsuba, which both read by their own code, must have the same light.
 //!
 //! `LANECAST_PYTHON` names a Python with numpy and mitsuba (default `python3`); without them the test says SKIPPED.
+//! With `LANECAST_LONG_TESTS` set both take sixteen times the samples, and nothing is put down to noise.
 //! What the two models of materials do not share is kept small by the scenes: facets of Mitsuba mask to both
 //! directions independently, ours by height, which differs below a thousandth at these widths.
 
@@ -27,8 +28,10 @@ const PASSES: u32 = 16;
 const NOISY_SPP: u32 = 64;
 /// How far the mean radiance of a region may be off.
 const CLOSE: f64 = 0.005;
-/// The same in standard deviations of both pictures' noise, where that is more.
+/// The same in standard deviations of both pictures' noise, where that is more; not allowed in the long test.
 const SIGMAS: f64 = 3.0;
+/// Samples per pixel of both pictures in the long test, which leave a tenth of a per cent of noise.
+const LONG_SPP: u32 = 65_536;
 
 fn python() -> Option<String> {
     let program = std::env::var("LANECAST_PYTHON").unwrap_or_else(|_| "python3".to_owned());
@@ -45,9 +48,9 @@ fn scene_file(name: &str) -> PathBuf {
 }
 
 /// Red, green, blue and variance of the brightness, of each pixel.
-fn mitsuba(python: &str, folder: &Path) -> Vec<Vec<[f64; 4]>> {
+fn mitsuba(python: &str, folder: &Path, spp: u32) -> Vec<Vec<[f64; 4]>> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/mitsuba_compare.py");
-    let numbers = [SIDE as u32, SPP, PASSES].map(|n| n.to_string());
+    let numbers = [SIDE as u32, spp, PASSES].map(|n| n.to_string());
     let files = SCENES.map(scene_file);
     let out = Command::new(python).arg(script).arg(folder).args(numbers).args(files).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
@@ -106,11 +109,13 @@ fn brightness(pixel: &[f64; 4]) -> f64 {
 fn pictures_agree_with_mitsuba() {
     let Some(python) = python() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let references = mitsuba(&python, folder.path());
+    let long = std::env::var_os("LANECAST_LONG_TESTS").is_some();
+    let (spp, sigmas) = if long { (LONG_SPP, 0.0) } else { (SPP, SIGMAS) };
+    let references = mitsuba(&python, folder.path(), spp);
     let mut failures = Vec::new();
     for (name, reference) in SCENES.into_iter().zip(references) {
         let scene = Neutral::read(&scene_file(name));
-        let picture = ours(&scene, SPP);
+        let picture = ours(&scene, spp);
         let mut worst = 0.0f64;
         for row in 0..REGIONS {
             for column in 0..REGIONS {
@@ -122,7 +127,7 @@ fn pictures_agree_with_mitsuba() {
                     let off = (f - w) / mean.max(1e-9);
                     worst = worst.max(off.abs());
                     // Where both pictures together are too noisy to tell, chance is allowed for.
-                    if off.abs() > CLOSE.max(SIGMAS * noise) {
+                    if off.abs() > CLOSE.max(sigmas * noise) {
                         failures.push(format!(
                             "{name}, {column},{row}, colour {c}: {f:.6}, Mitsuba {w:.6} ({:.2} %, noise {:.2} %)",
                             100.0 * off,

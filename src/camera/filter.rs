@@ -5,7 +5,7 @@
 
 use std::sync::LazyLock;
 
-use crate::error::{Error, Result, nearest_name};
+use crate::error::{Error, Result, by_name};
 
 /// Weight of a sample by its distance from the pixel's centre.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,11 +73,7 @@ impl std::str::FromStr for Filter {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|f| f.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name);
-            let hint = nearest_name(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-            Error::Usage(format!("unknown filter `{name}`, expected one of {}{hint}", names.join(", ")))
-        })
+        by_name("filter", &Self::ALL, Self::name, name)
     }
 }
 

@@ -6,6 +6,8 @@ mod report;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use indicatif::ProgressBar;
+
 use self::report::{Holds, Made, report, tell};
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
 use super::picture::{Format, Target, target, write};
@@ -22,7 +24,6 @@ use crate::scene::load::{ReadMesh, read_mesh};
 use crate::scene::world::World;
 use crate::shade::{Integrator, unknown_shaders};
 use crate::trace::Engines;
-use indicatif::ProgressBar;
 
 /// Picture size unless `--size` says otherwise.
 const DEFAULT_SIZE: (u32, u32) = (960, 540);

@@ -5,6 +5,7 @@ mod options;
 mod pixels;
 pub mod progressive;
 mod scheduler;
+mod tally;
 
 pub use aov::Aov;
 pub use options::{Progress, RenderOptions, Silent};

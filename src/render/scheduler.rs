@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::options::{Progress, RenderOptions, rect_of};
 use super::pixels::{Painter, add, mean, variance};
+use super::tally::Tally;
 use crate::camera::{Camera, PixelRect, Tiling, fill_tile, morton_decode};
 use crate::error::Result;
 use crate::film::Film;
@@ -39,8 +40,6 @@ pub struct RenderOutput {
     pub tiles_done: u64,
     /// Tiles of the window.
     pub tiles_total: u64,
-    /// Samples over all pixels of finished tiles.
-    pub samples: u64,
 }
 
 impl RenderOutput {
@@ -100,9 +99,8 @@ pub fn render_with<S: Real>(
             if finished {
                 painter_of(&painter, &sums, &memory.pixels);
             }
-            let tally = memory.tally(finished, &sums);
             memory.sums = sums;
-            tally
+            Tally::take(&mut memory.work, u64::from(finished))
         };
         tiles.par_iter().map_init(TileMemory::default, one_tile).reduce(Tally::default, Tally::plus)
     };
@@ -114,29 +112,7 @@ pub fn render_with<S: Real>(
         paths: tally.paths,
         tiles_done: tally.done,
         tiles_total: tiles.len() as u64,
-        samples: tally.samples,
     })
-}
-
-/// What tiles add up to.
-#[derive(Default)]
-struct Tally {
-    done: u64,
-    samples: u64,
-    rays: RayCounts,
-    counters: Counters,
-    paths: PathStats,
-}
-
-impl Tally {
-    fn plus(mut self, other: Self) -> Self {
-        self.done += other.done;
-        self.samples += other.samples;
-        self.rays += other.rays;
-        self.counters += other.counters;
-        self.paths.merge(&other.paths);
-        self
-    }
 }
 
 /// What all tiles of a render share.
@@ -197,19 +173,6 @@ impl<S: Real> Default for TileMemory<S> {
     }
 }
 
-impl<S: Real> TileMemory<S> {
-    fn tally(&mut self, finished: bool, sums: &Sums) -> Tally {
-        let work = &mut self.work;
-        Tally {
-            done: u64::from(finished),
-            samples: if finished { u64::from(sums.count) * sums.pixels.len() as u64 } else { 0 },
-            rays: take(&mut work.rays),
-            counters: take(&mut work.counters),
-            paths: take(&mut work.stats),
-        }
-    }
-}
-
 impl<S: Real> Job<'_, S> {
     /// Pixel of each ray of a tile.
     fn list_pixels(&self, tile: u32, pixels: &mut Vec<(u32, u32)>) {
@@ -264,7 +227,7 @@ impl<S: Real> Job<'_, S> {
                     }
                 }
                 *is_done = self.options.noise.is_some_and(|noise| sums.count >= FIRST_ROUND && sums.error() <= noise);
-                memory.tally(false, sums)
+                Tally::take(&mut memory.work, 0)
             };
             let round = states.par_iter_mut().map_init(TileMemory::default, one_tile);
             total = total.plus(round.reduce(Tally::default, Tally::plus));
@@ -279,7 +242,7 @@ impl<S: Real> Job<'_, S> {
             }
             self.list_pixels(*tile, &mut memory.pixels);
             paint(sums, &memory.pixels);
-            memory.tally(true, sums)
+            Tally { done: 1, ..Tally::default() }
         };
         let painted = states.par_iter().map_init(TileMemory::default, finished);
         total.plus(painted.reduce(Tally::default, Tally::plus))

@@ -14,6 +14,8 @@ const MIRROR_WIDTH: f64 = 0.05;
 pub struct Classic {
     /// Radiance that leaves the point towards the viewer by itself.
     pub emission: DVec3,
+    /// Base colour of the material.
+    pub base: DVec3,
     /// Diffuse reflectance.
     pub diffuse: DVec3,
     /// Share of the mirrored direction's radiance.
@@ -31,7 +33,8 @@ impl Classic {
         let material = looks.resolve(surface.material, 1.0);
         let look = looks.look(material, surface, from_front);
         let cos = surface.ng.dot(dir.normalize_or_zero()).abs().min(1.0);
-        Self { emission: looks.emission(surface.material, surface, from_front), ..Self::scattered(&look, cos) }
+        let emission = looks.emission(surface.material, surface, from_front);
+        Self { emission, base: look.base, ..Self::scattered(&look, cos) }
     }
 
     /// How `look` scatters light that it meets at cosine `cos`.

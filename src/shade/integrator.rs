@@ -1,6 +1,6 @@
 //! The integrators by name.
 
-use crate::error::{Error, Result, nearest_name};
+use crate::error::{Error, Result, by_name};
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,10 +46,6 @@ impl std::str::FromStr for Integrator {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|i| i.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name);
-            let hint = nearest_name(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-            Error::Usage(format!("unknown integrator `{name}`, expected one of {}{hint}", names.join(", ")))
-        })
+        by_name("integrator", &Self::ALL, Self::name, name)
     }
 }

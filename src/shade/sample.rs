@@ -25,7 +25,7 @@ pub struct Sample {
     pub direct: DVec3,
     /// Material number.
     pub material: u32,
-    /// Of a pixel: variance of the mean brightness, estimated from its samples.
+    /// Of a sum of samples: sum of their squared brightness. Of a pixel: variance of its mean brightness.
     pub square: f64,
     /// Of a pixel: number of samples.
     pub samples: u32,

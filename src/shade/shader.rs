@@ -64,8 +64,6 @@ pub(super) struct Vertex {
     pub material: u32,
     /// What the point does with light from the direction it is seen along.
     pub classic: Classic,
-    /// Base colour.
-    pub albedo: DVec3,
     /// Share of ambient light that arrives.
     pub ambient: f64,
     /// What of this point's radiance reaches the eye.
@@ -193,7 +191,8 @@ impl<'a, S: Real> Shader<'a, S> {
         work.clock.start(&work.rays);
         work.rays.primary += rays.live_count() as u64;
         if let (Integrator::Rt, Some(rt)) = (self.settings.integrator, &self.rt) {
-            return self.rt(rt, rays, work, out);
+            self.rt(rt, rays, work, out);
+            return work.lap(0);
         }
         if let Some(paths) = &self.paths {
             return paths.shade(rays, pixels, sample, work, out);
@@ -219,22 +218,21 @@ impl<'a, S: Real> Shader<'a, S> {
             seen.normal = vertex.normal;
             seen.shading_normal = vertex.shading_normal;
             seen.material = vertex.material;
-            seen.albedo = vertex.albedo;
+            seen.albedo = vertex.classic.base;
             (seen.inst, seen.prim) = (work.hits.inst[i], work.hits.prim[i]);
         }
         match self.settings.integrator {
             // Without regions to look at, `rt`'s model has nothing to say.
             Integrator::Whitted | Integrator::Rt | Integrator::Path => self.whitted(rays, pixels, sample, work, out),
-            Integrator::Ao => self.ambient_occlusion(pixels, sample, work, out),
-            Integrator::Normals => super::views::normals(out),
-            Integrator::Depth => super::views::depth(out),
-            Integrator::Cost => super::views::cost(out),
-        }
-        if matches!(
-            self.settings.integrator,
-            Integrator::Ao | Integrator::Normals | Integrator::Depth | Integrator::Cost
-        ) {
-            work.lap(0);
+            view => {
+                match view {
+                    Integrator::Ao => self.ambient_occlusion(pixels, sample, work, out),
+                    Integrator::Normals => super::views::normals(out),
+                    Integrator::Depth => super::views::depth(out),
+                    _ => super::views::cost(out),
+                }
+                work.lap(0);
+            }
         }
     }
 
@@ -250,8 +248,10 @@ impl<'a, S: Real> Shader<'a, S> {
 
     /// The same where every surface counts.
     pub(super) fn intersect_all(&self, rays: &Rays<S>, work: &mut Workspace<S>) {
+        let clock = Instant::now();
         let counters = self.settings.count.then_some(&mut work.counters);
         self.engine.intersect(self.world, rays, &mut work.hits, &mut work.scratch, counters);
+        work.clock.tracing += clock.elapsed();
     }
 
     /// Calls `lit` with the number of each ray of `work.batch` that is not occluded, and the share of its light that
@@ -319,9 +319,8 @@ impl<'a, S: Real> Shader<'a, S> {
         let error = position_error::<S>(org, dir, t, surface.position, surface.magnitude);
         let (position, material) = (surface.position, surface.material);
         let classic = Classic::of(&self.looks, &surface, dir);
-        let albedo = self.looks.look(self.looks.resolve(material, 1.0), &surface, surface.ng.dot(dir) <= 0.0).base;
         let ambient = self.looks.ambient(material, &surface);
-        Vertex { path, position, error, normal, shading_normal, dir, material, classic, albedo, ambient, throughput }
+        Vertex { path, position, error, normal, shading_normal, dir, material, classic, ambient, throughput }
     }
 }
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::camera::{Camera, PixelRect, SubPixel, Tiling, fill_tile, morton_decode};
-use crate::error::{Error, Result, nearest_name};
+use crate::error::{Error, Result, by_name};
 use crate::film::heat;
 use crate::ray::{Counters, Hits, Rays};
 use crate::render::{Progress, RenderOptions, RenderOutput};
@@ -58,11 +58,7 @@ impl std::str::FromStr for Heat {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|heat| heat.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name);
-            let hint = nearest_name(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-            Error::Usage(format!("unknown map `{name}`, expected off, {}{hint}", names.join(", ")))
-        })
+        by_name("map", &Self::ALL, Self::name, name)
     }
 }
 
@@ -108,7 +104,6 @@ pub(super) fn render<S: Engines>(
         seconds: clock.elapsed().as_secs_f64(),
         counters: done.counters,
         paths: Default::default(),
-        samples: window.area(),
         tiles_done: done.tiles,
         tiles_total: tiles.len() as u64,
     })

@@ -102,7 +102,7 @@ pub(super) fn report<'a>(
         isa: compiled_isa(),
         threads: rayon::current_num_threads(),
         spp: options.spp,
-        samples_per_pixel: output.samples as f64 / (output.tiles_done.max(1) as f64 * f64::from(options.tile).powi(2)),
+        samples_per_pixel: rays.primary as f64 / film.window.area().max(1) as f64,
         seed: options.seed,
         complete: output.is_complete(),
         tiles: (output.tiles_done, output.tiles_total),

@@ -26,14 +26,15 @@ pub use steps::{LARGEST_BLOCK, Step};
 use super::options::{Progress, RenderOptions, rect_of};
 use super::pixels::{Painter, add, mean};
 use super::scheduler::RenderOutput;
+use super::tally::Tally;
 use crate::camera::{Camera, PixelRect, Tiling, fill_pixels, fill_tile, morton_decode};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::lanes::Real;
-use crate::ray::{Counters, Rays};
+use crate::ray::Rays;
 use crate::scene::description::Description;
 use crate::scene::world::World;
-use crate::shade::{PathStats, RayCounts, Sample, Shader, Workspace, headlight};
+use crate::shade::{Sample, Shader, Workspace, headlight};
 use crate::trace::Engine;
 use steps::{Lattice, check_start, plan};
 
@@ -83,36 +84,12 @@ struct Memory<S> {
     work: Workspace<S>,
     pixels: Vec<(u32, u32)>,
     samples: Vec<Sample>,
-    /// Samples made, not yet summed up.
-    traced: u64,
 }
 
 impl<S: Real> Default for Memory<S> {
     fn default() -> Self {
         let (rays, work) = (Rays::new(0), Workspace::default());
-        Self { rays, work, pixels: Vec::new(), samples: Vec::new(), traced: 0 }
-    }
-}
-
-/// What batches add up to.
-#[derive(Default)]
-struct Tally {
-    done: u64,
-    /// Samples over all pixels.
-    samples: u64,
-    rays: RayCounts,
-    counters: Counters,
-    paths: PathStats,
-}
-
-impl Tally {
-    fn plus(mut self, other: Self) -> Self {
-        self.done += other.done;
-        self.samples += other.samples;
-        self.rays += other.rays;
-        self.counters += other.counters;
-        self.paths.merge(&other.paths);
-        self
+        Self { rays, work, pixels: Vec::new(), samples: Vec::new() }
     }
 }
 
@@ -212,7 +189,6 @@ impl<'a, S: Real> Progressive<'a, S> {
             paths: self.tally.paths,
             tiles_done: self.tally.done,
             tiles_total: self.total,
-            samples: self.tally.samples,
         }
     }
 
@@ -232,7 +208,6 @@ impl<'a, S: Real> Progressive<'a, S> {
             let size = (self.options.width, self.options.height);
             fill_pixels(self.camera, size, &memory.pixels, self.options.sub_pixel(0), &mut memory.rays);
             self.shader.shade(&memory.rays, &memory.pixels, 0, &mut memory.work, &mut memory.samples);
-            memory.traced += memory.pixels.len() as u64;
             for (&(x, y), sample) in memory.pixels.iter().zip(&memory.samples) {
                 self.keep_first(x, y, sample);
             }
@@ -277,14 +252,13 @@ impl<'a, S: Real> Progressive<'a, S> {
             tile.sums.resize(count as usize, Sample::MISS);
             while tile.samples < samples {
                 if stop(watch, stopped) {
-                    return taken(memory, 0);
+                    return Tally::take(&mut memory.work, 0);
                 }
                 let sub_pixel = self.options.sub_pixel(tile.samples);
                 fill_tile(self.camera, &self.tiling, *number, self.rect, sub_pixel, &mut memory.rays);
-                let Memory { rays, work, pixels, samples: seen, traced } = memory;
+                let Memory { rays, work, pixels, samples: seen } = memory;
                 self.shader.shade(rays, pixels, tile.samples, work, seen);
                 tile.sums.iter_mut().zip(seen).for_each(|(sum, sample)| add(sum, sample));
-                *traced += pixels.len() as u64;
                 tile.samples += 1;
             }
             let frame = &mut *locked(&self.frame);
@@ -306,15 +280,8 @@ impl<'a, S: Real> Progressive<'a, S> {
     fn told(&self, watch: Watch<'_>, frame: &Framebuffer, part: Window, memory: &mut Memory<S>) -> Tally {
         watch.viewer.painted(frame, part);
         watch.progress.tile_done(watch.total);
-        taken(memory, 1)
+        Tally::take(&mut memory.work, 1)
     }
-}
-
-/// What was counted since the last time.
-fn taken<S: Real>(memory: &mut Memory<S>, done: u64) -> Tally {
-    let work = &mut memory.work;
-    let (rays, counters, paths) = (take(&mut work.rays), take(&mut work.counters), take(&mut work.stats));
-    Tally { done, samples: take(&mut memory.traced), rays, counters, paths }
 }
 
 fn lattice(window: Window, tiling: &Tiling, block: u32, start: u32) -> Lattice {

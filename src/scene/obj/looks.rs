@@ -48,7 +48,7 @@ pub fn read(file: &Path, obj: &ObjFile, references: &References<'_>) -> Result<L
     let mut textures = Images::default();
     let (mut known, mut seen, mut ignored) = (HashSet::new(), HashSet::new(), 0);
     for written in obj.material_libs.iter().filter(|written| seen.insert(written.as_str())) {
-        let Some(library) = reader.library(written)? else { continue };
+        let Some(library) = reader.materials_of(written)? else { continue };
         ignored += library.ignored;
         for entry in &library.entries {
             // The first definition counts, as the first library that has one does.
@@ -106,7 +106,7 @@ impl Reader<'_> {
         }
     }
 
-    fn library(&mut self, written: &str) -> Result<Option<mtl::Library>> {
+    fn materials_of(&mut self, written: &str) -> Result<Option<mtl::Library>> {
         let Some(path) = self.resolve(written) else { return Ok(None) };
         // Asked before it is opened: opening a pipe waits for its writer.
         if !path.is_file() {

@@ -250,7 +250,7 @@ impl<'a, S: Real> Paths<'a, S> {
                 if bounce == 0 {
                     seen.alpha = 1.0;
                     if self.first_hits {
-                        self.first_hit(org, dir, i, hits, bare.material, seen);
+                        self.met(i, org, dir, hits).resolved(self, bare.material, dir).show(i, dir, hits, seen);
                     }
                 }
                 let fields = raw_fields(wave, i, hits, &triangle, look);
@@ -258,10 +258,9 @@ impl<'a, S: Real> Paths<'a, S> {
                 return;
             }
         }
-        let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
-        let surface = self.world.surface(org, dir, t, u, v, prim, inst);
-        let from_front = surface.ng.dot(dir) <= 0.0;
-        let emitted = self.looks.emission(surface.material, &surface, from_front);
+        let met = self.met(i, org, dir, hits);
+        let surface = &met.surface;
+        let emitted = self.looks.emission(surface.material, surface, met.from_front);
         if emitted != DVec3::ZERO {
             let light = if pdf.is_infinite() {
                 0.0
@@ -276,23 +275,22 @@ impl<'a, S: Real> Paths<'a, S> {
         let choice = || number(memory.pixels[path as usize], sample, bounce, MIXTURE);
         let material =
             if self.looks.has_mixtures { self.looks.resolve(surface.material, choice()) } else { surface.material };
-        let look = self.looks.look(material, &surface, from_front);
-        let out_dir = -dir.normalize_or_zero();
-        let ng = if from_front { surface.ng } else { -surface.ng };
-        let ns = self.shading_normal(material, &surface, from_front, ng, out_dir);
+        let arrival = met.resolved(self, material, dir);
         if bounce == 0 {
             seen.alpha = 1.0;
             if self.first_hits {
-                self.first_hit(org, dir, i, hits, material, seen);
+                arrival.show(i, dir, hits, seen);
             }
             if self.depth == 0 {
                 return;
             }
         }
+        let Arrival { surface, ng, ns, look } = arrival;
         // A triangle too thin for a normal scatters nothing.
         if ng == DVec3::ZERO || !ng.is_finite() {
             return;
         }
+        let t = hits.t[i].to_f64();
         let error = position_error::<S>(org, dir, t, surface.position, surface.magnitude)
             + surface.position.abs() * (2.0 * S::EPSILON.to_f64());
         let mut fields = [S::ZERO; FIELDS];
@@ -300,7 +298,7 @@ impl<'a, S: Real> Paths<'a, S> {
         put(POSITION, surface.position);
         put(SHADING, ns);
         put(NORMAL, ng);
-        put(OUT, out_dir);
+        put(OUT, -dir.normalize_or_zero());
         put(BASE, look.base);
         (0..7).for_each(|k| fields[PARAM + k] = S::from_f64(look.param[k]));
         fields[OFFSET] = S::from_f64(ng.abs().dot(error));
@@ -309,25 +307,48 @@ impl<'a, S: Real> Paths<'a, S> {
         memory.points[look.model as usize].push(path, &fields, false);
     }
 
-    /// What pictures show of the first hit, besides radiance; a mixture has been resolved to `material`.
-    fn first_hit(&self, org: DVec3, dir: DVec3, i: usize, hits: &Hits<S>, material: u32, seen: &mut Sample) {
+    /// What ray `i`, in f64 `org` and `dir`, has hit.
+    fn met(&self, i: usize, org: DVec3, dir: DVec3, hits: &Hits<S>) -> Met<'_> {
         let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
         let surface = self.world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);
-        let from_front = surface.ng.dot(dir) <= 0.0;
-        let ng = if from_front { surface.ng } else { -surface.ng };
-        seen.distance = t * dir.length();
-        seen.position = surface.position;
-        seen.normal = ng;
-        seen.shading_normal = self.shading_normal(material, &surface, from_front, ng, -dir.normalize_or_zero());
-        seen.albedo = self.looks.look(material, &surface, from_front).base;
-        (seen.inst, seen.prim, seen.material) = (hits.inst[i], hits.prim[i], surface.material);
+        Met { surface, from_front: surface.ng.dot(dir) <= 0.0 }
     }
+}
 
-    /// The shading normal on the side of `ng`; `ng` itself where `out` is behind it.
-    fn shading_normal(&self, material: u32, surface: &Surface<'_>, from_front: bool, ng: DVec3, out: DVec3) -> DVec3 {
-        let ns = self.looks.bumped(material, surface);
-        let ns = if from_front { ns } else { -ns };
-        if ns.dot(out) > 1e-3 { ns } else { ng }
+/// A surface, and whether it is seen from the side of its normal.
+struct Met<'w> {
+    surface: Surface<'w>,
+    from_front: bool,
+}
+
+/// A surface with normals towards the viewer and what it scatters with.
+struct Arrival<'w> {
+    surface: Surface<'w>,
+    ng: DVec3,
+    /// `ng` itself where the viewer is behind the shading normal.
+    ns: DVec3,
+    look: Look,
+}
+
+impl<'w> Met<'w> {
+    /// The same of material `material`, no mixture, seen along `dir`.
+    fn resolved<S: Real>(self, paths: &Paths<'_, S>, material: u32, dir: DVec3) -> Arrival<'w> {
+        let Self { surface, from_front } = self;
+        let turned = |n: DVec3| if from_front { n } else { -n };
+        let (ng, ns) = (turned(surface.ng), turned(paths.looks.bumped(material, &surface)));
+        let ns = if -ns.dot(dir.normalize_or_zero()) > 1e-3 { ns } else { ng };
+        Arrival { surface, ng, ns, look: paths.looks.look(material, &surface, from_front) }
+    }
+}
+
+impl Arrival<'_> {
+    /// What pictures show of the first hit, besides radiance.
+    fn show<S: Real>(&self, i: usize, dir: DVec3, hits: &Hits<S>, seen: &mut Sample) {
+        seen.distance = hits.t[i].to_f64() * dir.length();
+        seen.position = self.surface.position;
+        (seen.normal, seen.shading_normal) = (self.ng, self.ns);
+        seen.albedo = self.look.base;
+        (seen.inst, seen.prim, seen.material) = (hits.inst[i], hits.prim[i], self.surface.material);
     }
 }
 

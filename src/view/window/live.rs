@@ -1,7 +1,5 @@
 //! A window that only shows a picture while another part of the program makes it.
 
-use std::num::NonZeroU32;
-use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -9,14 +7,13 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use winit::application::ApplicationHandler;
-use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, EventLoop, EventLoopProxy};
 use winit::keyboard::{Key, NamedKey};
-use winit::window::{Window as NativeWindow, WindowId};
+use winit::window::WindowId;
 
-use super::Surface;
 use super::screen::Screen;
+use super::surface::Surface;
 use crate::film::{Film, Window};
 use crate::render::progressive::{Framebuffer, Step, Viewer};
 use crate::view::levels::Levels;
@@ -122,7 +119,7 @@ struct App {
     title: String,
     size: (u32, u32),
     screen: Arc<Mutex<Screen>>,
-    shown: Option<(Rc<NativeWindow>, Surface)>,
+    shown: Option<Surface>,
     proxy: Option<EventLoopProxy<Call>>,
     answer: Option<Sender<Answer>>,
 }
@@ -141,28 +138,6 @@ impl App {
         let _: Option<EventLoop<Call>> = None;
         Err("this system wants windows on the main thread, which renders; `lanecast view` has one".into())
     }
-
-    fn create(&self, event_loop: &ActiveEventLoop) -> Result<(Rc<NativeWindow>, Surface), Box<dyn std::error::Error>> {
-        let size = PhysicalSize::new(self.size.0, self.size.1);
-        let title = format!("lanecast {}", self.title);
-        let attributes = NativeWindow::default_attributes().with_title(title).with_inner_size(size);
-        let window = Rc::new(event_loop.create_window(attributes)?);
-        let context = softbuffer::Context::new(window.clone())?;
-        let surface = softbuffer::Surface::new(&context, window.clone())?;
-        Ok((window, surface))
-    }
-
-    fn draw(&mut self) -> Result<(), softbuffer::SoftBufferError> {
-        let Some((window, surface)) = &mut self.shown else { return Ok(()) };
-        let size = window.inner_size();
-        let (Some(width), Some(height)) = (NonZeroU32::new(size.width), NonZeroU32::new(size.height)) else {
-            return Ok(());
-        };
-        surface.resize(width, height)?;
-        let mut buffer = surface.buffer_mut()?;
-        locked(&self.screen).copy_to(size.width, size.height, &mut buffer);
-        buffer.present()
-    }
 }
 
 impl ApplicationHandler<Call> for App {
@@ -170,7 +145,7 @@ impl ApplicationHandler<Call> for App {
         if self.shown.is_some() {
             return;
         }
-        let made = self.create(event_loop).map_err(|e| e.to_string());
+        let made = Surface::open(event_loop, &self.title, self.size);
         let answer = made.and_then(|shown| {
             self.shown = Some(shown);
             self.proxy.clone().ok_or_else(|| "the window cannot be called".into())
@@ -186,7 +161,7 @@ impl ApplicationHandler<Call> for App {
 
     fn user_event(&mut self, event_loop: &ActiveEventLoop, call: Call) {
         match (call, &self.shown) {
-            (Call::Redraw, Some((window, _))) => window.request_redraw(),
+            (Call::Redraw, Some(surface)) => surface.request_redraw(),
             (Call::Redraw, None) => {}
             (Call::Close, _) => event_loop.exit(),
         }
@@ -205,7 +180,12 @@ impl ApplicationHandler<Call> for App {
             {
                 event_loop.exit();
             }
-            WindowEvent::RedrawRequested if self.draw().is_err() => event_loop.exit(),
+            WindowEvent::RedrawRequested => {
+                let screen = locked(&self.screen);
+                if self.shown.as_mut().is_some_and(|surface| surface.show(&screen).is_err()) {
+                    event_loop.exit();
+                }
+            }
             _ => {}
         }
     }

@@ -3,24 +3,24 @@
 mod input;
 pub mod live;
 mod screen;
+mod surface;
 mod worker;
 
-use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, EventLoop};
-use winit::window::{Window, WindowId};
+use winit::window::WindowId;
 
 use super::action::Action;
 use super::studio::{Save, Studio};
 use crate::error::{Error, Result};
 use input::{HELP, Pointer, Request};
 use screen::{LINE, Screen};
+use surface::Surface;
 use worker::{Shared, Wanted};
 
 /// Largest side of a window that is rendered at its full size, pixels.
@@ -31,8 +31,6 @@ const WATCH: Duration = Duration::from_millis(200);
 /// Something new is to be seen.
 #[derive(Debug)]
 struct Wake;
-
-type Surface = softbuffer::Surface<Rc<Window>, Rc<Window>>;
 
 /// Opens a window on what `studio` shows and stays until it is closed. Must run on the main thread; pictures are made on
 /// `pool`. Pictures saved by key go to the current folder as `name` with a number.
@@ -105,7 +103,7 @@ struct App<'a> {
     shared: &'a Shared,
     save: Save<'a>,
     name: &'a str,
-    shown: Option<(Rc<Window>, Surface)>,
+    shown: Option<Surface>,
     pointer: Pointer,
     /// Whether the status line is shown, and the help.
     text: bool,
@@ -116,25 +114,13 @@ struct App<'a> {
 }
 
 impl App<'_> {
-    fn create(&mut self, event_loop: &ActiveEventLoop) -> std::result::Result<(), Box<dyn std::error::Error>> {
-        let options = self.shared.wanted().view.look.options;
-        let size = PhysicalSize::new(options.width, options.height);
-        let attributes =
-            Window::default_attributes().with_title(format!("lanecast {}", self.name)).with_inner_size(size);
-        let window = Rc::new(event_loop.create_window(attributes)?);
-        let context = softbuffer::Context::new(window.clone())?;
-        let surface = softbuffer::Surface::new(&context, window.clone())?;
-        self.shown = Some((window, surface));
-        Ok(())
-    }
-
     fn say(&self, what: Option<String>) {
         *self.message.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = what;
     }
 
     fn redraw(&self) {
-        if let Some((window, _)) = &self.shown {
-            window.request_redraw();
+        if let Some(surface) = &self.shown {
+            surface.request_redraw();
         }
     }
 
@@ -238,29 +224,20 @@ impl App<'_> {
         screen.write(top, &lines);
         screen
     }
-
-    fn draw(&mut self) -> std::result::Result<(), Box<dyn std::error::Error>> {
-        let screen = self.composed();
-        let Some((window, surface)) = &mut self.shown else { return Ok(()) };
-        let size = window.inner_size();
-        let (Some(width), Some(height)) = (NonZeroU32::new(size.width), NonZeroU32::new(size.height)) else {
-            return Ok(());
-        };
-        surface.resize(width, height)?;
-        let mut buffer = surface.buffer_mut()?;
-        screen.copy_to(size.width, size.height, &mut buffer);
-        buffer.present()?;
-        Ok(())
-    }
 }
 
 impl ApplicationHandler<Wake> for App<'_> {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
-        if self.shown.is_none()
-            && let Err(error) = self.create(event_loop)
-        {
-            self.failure = Some(error.to_string());
-            event_loop.exit();
+        if self.shown.is_some() {
+            return;
+        }
+        let options = self.shared.wanted().view.look.options;
+        match Surface::open(event_loop, self.name, (options.width, options.height)) {
+            Ok(surface) => self.shown = Some(surface),
+            Err(error) => {
+                self.failure = Some(error);
+                event_loop.exit();
+            }
         }
     }
 
@@ -276,7 +253,8 @@ impl ApplicationHandler<Wake> for App<'_> {
                 None
             }
             WindowEvent::RedrawRequested => {
-                if let Err(error) = self.draw() {
+                let screen = self.composed();
+                if let Some(Err(error)) = self.shown.as_mut().map(|surface| surface.show(&screen)) {
                     self.failure = Some(error.to_string());
                     event_loop.exit();
                 }
@@ -290,7 +268,7 @@ impl ApplicationHandler<Wake> for App<'_> {
                 input::key(&event.logical_key)
             }
             WindowEvent::CursorMoved { position, .. } => {
-                let height = self.shown.as_ref().map_or(1.0, |(window, _)| f64::from(window.inner_size().height));
+                let height = self.shown.as_ref().map_or(1.0, |surface| f64::from(surface.size().1));
                 self.pointer.moved(position.x, position.y, height)
             }
             WindowEvent::MouseInput { state, button, .. } => self.pointer.button(button, state),
