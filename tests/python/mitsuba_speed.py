@@ -10,12 +10,10 @@ over all pixels, at the same samples per pixel and the same filter (a box of one
 
 import argparse
 import csv
-import datetime
 import hashlib
 import json
 import os
 import pathlib
-import platform
 import statistics
 import subprocess
 import sys
@@ -24,6 +22,7 @@ import time
 
 import numpy as np
 
+import machine
 import mitsuba_scene
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -114,21 +113,6 @@ def serve(variant, scene, size, spp, threads):
         print(json.dumps({"seconds": seconds}), flush=True)
 
 
-def cpu():
-    """Model and instruction sets of this machine."""
-    model, flags = platform.processor(), ""
-    try:
-        for line in pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                model = line.split(":", 1)[1].strip()
-            if line.startswith("flags"):
-                wanted = ("avx", "avx2", "fma", "avx512f")
-                flags = "+".join(f for f in wanted if f in line.split())
-    except OSError:
-        pass
-    return model, flags
-
-
 def relative_variance(moments):
     mean, variance = moments
     return float((variance / (mean * mean + 1e-4)).mean())
@@ -160,13 +144,13 @@ def measure(args, scene):
             times[name].append(program.seconds(round_))
     noise = {name: relative_variance(moments[name]) for name in judged}
     paths = args.size**2 * args.spp
-    model, flags = cpu()
+    model, flags = machine.cpu()
     for name, seconds in times.items():
         median = statistics.median(seconds)
         mad = statistics.median(abs(s - median) for s in seconds)
         yield {
             "revision": programs["lanecast"].version,
-            "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
+            "date": machine.now(),
             "cpu": model,
             "flags": flags,
             "threads": args.threads,
@@ -180,7 +164,7 @@ def measure(args, scene):
             "repeat": args.repeat,
             "best_seconds": round(min(seconds), 5),
             "median_seconds": round(median, 5),
-            "spread": round((max(seconds) - min(seconds)) / median, 4),
+            "spread": machine.spread(seconds),
             "mad_seconds": round(mad, 6),
             "median_mpaths_per_s": round(paths / median / 1e6, 4),
             "ours_over_this": round(median / statistics.median(times["lanecast"]), 4),
