@@ -39,15 +39,35 @@ impl<S: Real> Affine<S> {
     }
 }
 
-/// A normal of the local space in the world: the inverse transpose of `to_world`, made unit.
-/// A zero or non-finite result (degenerate input) comes back as zero.
+/// How a map takes normals: by its inverse transpose.
+#[derive(Clone, Copy, Debug)]
+pub struct NormalMap {
+    /// Columns of the inverse transpose times the determinant's size; it exists for singular maps too.
+    cofactor: [DVec3; 3],
+    /// -1 for mirroring maps, which turn the cofactor matrix inside out.
+    sign: f64,
+}
+
+impl NormalMap {
+    /// Of the map `to_world`.
+    pub fn new(to_world: &DAffine3) -> Self {
+        let m = to_world.matrix3;
+        let cofactor = [m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis)];
+        Self { cofactor, sign: m.determinant().signum() }
+    }
+
+    /// A normal of the local space in the world, made unit. A zero or non-finite result (degenerate input) comes back as
+    /// zero.
+    #[inline]
+    pub fn apply(&self, local: DVec3) -> DVec3 {
+        let n = self.cofactor[0] * local.x + self.cofactor[1] * local.y + self.cofactor[2] * local.z;
+        (n * self.sign).normalize_or_zero()
+    }
+}
+
+/// A normal of the local space in the world: [`NormalMap`] for a single one.
 pub fn normal_to_world(to_world: &DAffine3, local: DVec3) -> DVec3 {
-    let m = to_world.matrix3;
-    // The cofactor matrix is the inverse transpose times the determinant; it exists for singular maps too.
-    let cofactor = [m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis)];
-    let n = cofactor[0] * local.x + cofactor[1] * local.y + cofactor[2] * local.z;
-    // A mirroring map turns the cofactor matrix inside out.
-    (n * m.determinant().signum()).normalize_or_zero()
+    NormalMap::new(to_world).apply(local)
 }
 
 /// The box of a box's image under `m` (Arvo, "Transforming axis-aligned bounding boxes", Graphics Gems, 1990).

@@ -4,4 +4,4 @@ mod aabb;
 mod affine;
 
 pub use aabb::Aabb;
-pub use affine::{Affine, normal_to_world, transformed_bounds};
+pub use affine::{Affine, NormalMap, normal_to_world, transformed_bounds};

@@ -1,5 +1,8 @@
-//! Which part and which material a primitive belongs to.
+//! Which part and which material a primitive belongs to, and where shapes stand.
 
+use glam::{DAffine3, DVec3};
+
+use crate::math::NormalMap;
 use crate::scene::assembly::{AssemblyObject, PartKind};
 use crate::scene::description::Description;
 use crate::scene::solids::flat::FlatLeaf;
@@ -15,10 +18,41 @@ pub struct Run {
     pub part: u32,
 }
 
+/// Most places of shapes that an object keeps; shapes of larger ones are placed anew for each hit.
+const MAX_PLACES: usize = 1 << 16;
+
+/// A shape's own space seen from another.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    to_local: DAffine3,
+    normals: NormalMap,
+}
+
+impl Place {
+    /// Of a shape that `map` takes to the other space.
+    pub fn new(map: &DAffine3) -> Self {
+        Self { to_local: map.inverse(), normals: NormalMap::new(map) }
+    }
+
+    /// A point of the other space in the shape's own.
+    #[inline]
+    pub fn local(&self, point: DVec3) -> DVec3 {
+        self.to_local.transform_point3(point)
+    }
+
+    /// A normal of the shape's space in the other one, unit.
+    #[inline]
+    pub fn normal(&self, local: DVec3) -> DVec3 {
+        self.normals.apply(local)
+    }
+}
+
 /// The runs of an object, found in nearly constant time.
 #[derive(Clone, Debug)]
 pub struct Runs {
     list: Vec<Run>,
+    /// Parallel to the list: places of shapes and leaves of solids in the object's space; empty where they are too many.
+    places: Vec<Option<Place>>,
     /// Primitives `k << shift` and above, below `(k + 1) << shift`, belong to runs `starts[k]..=starts[k + 1]`.
     starts: Vec<u32>,
     shift: u32,
@@ -35,21 +69,46 @@ impl Runs {
         let cells = (object.prim_count >> shift) + 1;
         let at = |prim: u64| list.partition_point(|run| u64::from(run.first) <= prim).saturating_sub(1) as u32;
         let starts = (0..=cells).map(|cell| at(u64::from(cell) << shift)).collect();
-        Self { list, starts, shift }
+        let places =
+            if list.len() > MAX_PLACES { Vec::new() } else { list.iter().map(|run| place(object, run)).collect() };
+        Self { list, places, starts, shift }
     }
 
     /// The run of primitive `prim`.
     #[inline]
     pub fn of(&self, prim: u32) -> Run {
+        self.list[self.find(prim)]
+    }
+
+    /// The place of primitive `prim`, a shape or a leaf of solids, in the object's space, if it is kept.
+    #[inline]
+    pub fn place(&self, prim: u32) -> Option<&Place> {
+        self.places.get(self.find(prim))?.as_ref()
+    }
+
+    fn find(&self, prim: u32) -> usize {
         let cell = (prim >> self.shift) as usize;
         let (low, high) = (self.starts[cell] as usize, self.starts[cell + 1] as usize);
         let after = self.list[low + 1..=high].partition_point(|run| run.first <= prim);
-        self.list[low + after]
+        low + after
     }
 
     /// All of them, in order.
     pub fn list(&self) -> &[Run] {
         &self.list
+    }
+}
+
+/// The place of the only shape of `run`.
+fn place(object: &AssemblyObject, run: &Run) -> Option<Place> {
+    let part = &object.parts[run.part as usize];
+    match &part.kind {
+        PartKind::Mesh(_) => None,
+        PartKind::Shape(_) => Some(Place::new(&part.to_object)),
+        PartKind::Solids(tree) => {
+            let leaf = tree.leaves.get((run.first - part.first_prim) as usize)?;
+            Some(Place::new(&(part.to_object * leaf.to_tree)))
+        }
     }
 }
 
