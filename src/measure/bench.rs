@@ -15,7 +15,7 @@ use crate::measure::truth;
 use crate::ray::{Counters, Rays};
 use crate::reference::{MARGIN_FACTOR, Oracle};
 use crate::scene::description::Description;
-use crate::scene::world::{Preset, World};
+use crate::scene::world::{BuildSettings, World};
 use crate::trace::{Engine, Engines, engine};
 
 /// Rounds that are run and thrown away before the timed ones: caches, page tables and clocks settle.
@@ -45,7 +45,7 @@ pub struct Plan {
     /// Seed of the random directions.
     pub seed: u64,
     /// Tree quality.
-    pub preset: Preset,
+    pub build: BuildSettings,
     /// Other tracers to run beside them.
     pub peers: Invitation,
 }
@@ -68,7 +68,7 @@ pub fn scene<S: Engines>(
 ) -> Result<()> {
     let engines = chosen::<S>(&plan.engines)?;
     plan.peers.check()?;
-    let world = workers.install(|| World::<S>::compile(description, plan.preset))?;
+    let world = workers.install(|| World::<S>::compile(description, plan.build))?;
     let view = workers.install(|| View::new(&world, description, camera, plan.size, plan.seed))?;
     let oracle = Oracle::new(&world.assembly);
     let stats = world.stats();
@@ -82,7 +82,7 @@ pub fn scene<S: Engines>(
     let guests = plan.peers.open::<S>(&world.assembly, workers)?;
     let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests };
     for &kind in &plan.kinds {
-        let rays = workers.install(|| view.rays(&world, kind));
+        let rays = workers.install(|| view.rays(&world, kind))?;
         subject.class(kind, &convert(&rays), plan.repeat, stop, report)?;
     }
     Ok(())

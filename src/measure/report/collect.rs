@@ -39,7 +39,7 @@ pub struct Run {
 }
 
 /// One row, by column. Besides the file's columns there are `preset`, `leaf` and `set`: what its command says of them, empty
-/// if it says nothing; and, if one parameter is set to a number, `parameter` and `setting`.
+/// if it says nothing.
 #[derive(Debug)]
 pub struct Row {
     /// Which of the runs.
@@ -142,13 +142,7 @@ fn with_options(mut cells: BTreeMap<String, String>) -> BTreeMap<String, String>
     for name in ["preset", "leaf"] {
         cells.insert(name.into(), options(&command, name).last().copied().unwrap_or_default().into());
     }
-    let set = options(&command, "set");
-    if let [(name, value)] = set.iter().filter_map(|set| set.split_once('=')).collect::<Vec<_>>()[..]
-        && value.parse::<f64>().is_ok()
-    {
-        cells.extend([("parameter", name), ("setting", value)].map(|(k, v)| (k.to_string(), v.to_string())));
-    }
-    cells.insert("set".into(), set.join(", "));
+    cells.insert("set".into(), options(&command, "set").join(", "));
     cells
 }
 

@@ -30,7 +30,7 @@ fn newest(found: &Found) -> Vec<(String, Vec<&Row>)> {
         let prims = rows.first().map_or("", |row| row.text("prims"));
         let plural = if threads == "1" { "" } else { "s" };
         let preset = if preset.is_empty() { preset } else { format!(", preset {preset}") };
-        let leaf = if leaf.is_empty() { leaf } else { format!(", at most {leaf} primitives in a leaf") };
+        let leaf = if leaf.is_empty() { leaf } else { format!(", leaves of up to {leaf}") };
         let set = if set.is_empty() { set } else { format!(", {set}") };
         let how = format!("{rays} rays, {precision}, {threads} thread{plural}{preset}{leaf}{set}");
         (format!("{scene}: {prims} primitives, {how}"), rows)

@@ -1,5 +1,4 @@
-//! How rates change with the number of threads, of primitives and of rays in the same picture, with the size of leaves and
-//! with a parameter of a scene that does not change the number of primitives.
+//! How rates change with the number of threads, of primitives and of rays in the same picture, and with the size of leaves.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,7 +22,7 @@ struct Axis {
     places: Places,
 }
 
-fn axes() -> [Axis; 5] {
+fn axes() -> [Axis; 4] {
     [
         Axis {
             column: "threads",
@@ -51,13 +50,6 @@ fn axes() -> [Axis; 5] {
             unit: "primitives in a leaf at most",
             same: &["scene", "scene_hash", "class", "precision", "rays", "threads"],
             least: 2,
-            places: Places::Linear,
-        },
-        Axis {
-            column: "setting",
-            unit: "values of the parameter",
-            same: &["scene", "prims", "class", "precision", "rays", "threads", "parameter"],
-            least: 3,
             places: Places::Linear,
         },
     ]
