@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use crate::error::{Error, Result};
 use crate::measure::agreement::{Agreement, compare};
 use crate::measure::answers::Answers;
+use crate::measure::explain::{self, Costs, Limit};
 use crate::measure::eye::{Framing, View};
 use crate::measure::peers::{Guest, Invitation, Peer};
 use crate::measure::raysets::{RayKind, convert};
@@ -80,7 +81,8 @@ pub fn scene<S: Engines>(
         bytes: stats.node_bytes + stats.prim_bytes,
     };
     let guests = plan.peers.open::<S>(&world.assembly, workers)?;
-    let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests };
+    let costs = explain::is_of_triangles(&world).then(|| workers.install(explain::costs::<S>));
+    let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests, costs };
     for &kind in &plan.kinds {
         let rays = workers.install(|| view.rays(&world, kind))?;
         subject.class(kind, &convert(&rays), plan.repeat, stop, report)?;
@@ -100,6 +102,8 @@ struct Subject<'a, S: 'static> {
     facts: SceneFacts,
     engines: Vec<&'static dyn Engine<S>>,
     guests: Vec<Guest<S>>,
+    /// Of single tests, if the scene is of triangles.
+    costs: Option<Costs>,
 }
 
 /// Answers that may be timed and, for a peer, how they compare with ours.
@@ -273,6 +277,9 @@ impl<S: Engines> Subject<'_, S> {
             Tracer::Peer(_) => Counters::default(),
         };
         let lane_use = |active: u64, total: u64| (total > 0).then(|| active as f64 / total as f64);
+        // Every thread has the time of the pass.
+        let of_limit = |costs: &Costs| Limit::of(costs, &counters, seconds.median * self.workers.threads() as f64);
+        let percent_of_limit = self.costs.as_ref().and_then(of_limit).map(|limit| limit.percent);
         Some(Outcome::Timed {
             seconds,
             repeat: one.seconds.len(),
@@ -282,6 +289,7 @@ impl<S: Engines> Subject<'_, S> {
             ratio: baseline.and_then(|b| paired_ratio_median(b, &one.seconds)),
             node_lane_use: lane_use(counters.node_lanes_active, counters.node_lanes_total),
             prim_lane_use: lane_use(counters.prim_lanes_active, counters.prim_lanes_total),
+            percent_of_limit,
         })
     }
 }

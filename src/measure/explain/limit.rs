@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
-use crate::lanes::{LaneMask, Lanes, Real};
+use crate::lanes::{Lanes, Real};
 use crate::ray::slab::Interval;
 use crate::ray::{Counters, Packet};
 use crate::scene::world::World;

@@ -124,8 +124,9 @@ pub fn limits(found: &Found) -> Option<Section> {
             figures.push(figure(&title, plot, &table(&head, &body), &rows));
         }
     }
-    let about = "Counted node, leaf and frustum tests times their cycle cost give the rate at which the machine could do just \
-                 that work and nothing else.";
+    let about = "Counted box and triangle tests times what single tests took in the same run, in full vectors over data in the \
+                 first cache, give the rate at which the machine could do just these tests and nothing else. An engine that \
+                 makes fewer tests has a higher limit; docs/METHODOLOGY.md says what the limit is not. Scenes of triangles only.";
     Section::of_figures("limits", "Achieved against the limit", about, figures)
 }
 
