@@ -237,7 +237,7 @@ impl Viewer for Steps {
 fn steps_come_in_order_and_set_what_they_say() {
     let (width, height) = (70, 33);
     let scene = scene(width, height);
-    let options = RenderOptions { width, height, spp: 3, engine: "scalar".into(), ..Default::default() };
+    let options = RenderOptions { width, height, spp: 5, engine: "scalar".into(), ..Default::default() };
     let scalar = engine::<f32>("scalar").unwrap();
     let mut picture = Progressive::new(scalar, &scene.world, &scene.description, &scene.camera, &options, 16).unwrap();
     let steps = Steps::default();
@@ -249,8 +249,8 @@ fn steps_come_in_order_and_set_what_they_say() {
         (Step::Blocks(4), left(4)),
         (Step::Blocks(2), left(2)),
         (Step::Blocks(1), 0),
-        (Step::Samples(2), 0),
-        (Step::Samples(3), 0),
+        (Step::Samples(4), 0),
+        (Step::Samples(5), 0),
     ];
     assert_eq!(*steps.0.lock().unwrap(), want);
 }

@@ -181,3 +181,19 @@ fn an_edit_is_seen() {
     let want = render(dir.path(), "scene.kdl --size 60x50");
     assert!(b == want, "the picture after the edit is the rendered one");
 }
+
+/// `set` is what `--set` is, in a scene that stays open; a mistake keeps the picture.
+#[test]
+fn a_parameter_is_set() {
+    let dir =
+        folder("wait\nset hole.radius 6\nwait\nsave seen.exr\nset hole.radius 6\nset hole 5\nwait\nsave kept.exr\n");
+    let said = view(dir.path(), "builtin:bolt --size 60x50");
+    assert_eq!((&said[1]["command"], &said[1]["changed"]), (&"set".into(), &true.into()));
+    assert_eq!(said[3]["changed"], false);
+    let error = said[4]["error"].as_str().expect("an error");
+    assert!(error.contains("no parameter `hole`"), "{error}");
+    let want = render(dir.path(), "builtin:bolt --size 60x50 --set hole.radius=6");
+    for name in ["seen.exr", "kept.exr"] {
+        assert!(exr::read(&dir.path().join(name)).unwrap() == want, "{name}");
+    }
+}

@@ -251,6 +251,35 @@ fn the_window_shows_what_is_rendered_and_follows_keys_pointer_and_edits() {
     assert_eq!((png.width, png.height), (WIDTH, HEIGHT));
 }
 
+/// A slider gives a parameter another value while it is dragged.
+#[test]
+fn sliders_change_the_scene() {
+    let Some(display) = Display::start() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let aside = tempfile::tempdir().unwrap();
+    let text = format!("parameter hole 1.2 from=1 to=1.5\n{}", SCENE.replace("RADIUS", "\"hole\""));
+    std::fs::write(dir.path().join("scene.kdl"), &text).unwrap();
+    std::fs::write(aside.path().join("scene.kdl"), &text).unwrap();
+    let mut person = Person::sit_down(&display, dir.path(), "view scene.kdl");
+    let start = scripted(aside.path(), "scene.kdl", "");
+    person.sees("the picture", &start, STATUS);
+    // Tab hides the status line, v shows the slider: its bar is 200 pixels long from the fourth on, below its name.
+    person.key(0xff09);
+    person.key(0x76);
+    let bar = |p: &Person, x: u32| p.screenshot()[(20 * WIDTH + x) as usize];
+    person.until("the slider", |p| (bar(p, 80) != bar(p, 90)).then_some(()));
+    person.drag((84, 20), (104, 20));
+    person.until("the slider where it was dragged", |p| (bar(p, 103) != bar(p, 104)).then_some(()));
+    person.key(0x76);
+    let wider = scripted(aside.path(), "scene.kdl", "set hole 1.25\n");
+    assert!(wider != start);
+    person.sees("the wider hole", &wider, 0);
+    // r puts it back.
+    person.key(0x72);
+    person.sees("the first picture", &start, 0);
+    person.quits();
+}
+
 /// `render --preview window` shows what it writes and stays until it is closed.
 #[test]
 fn a_render_can_be_watched() {

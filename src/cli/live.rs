@@ -20,7 +20,7 @@ use crate::shade::Integrator;
 use crate::trace::{EXACT_ENGINE, Engines};
 use crate::view::action::View;
 use crate::view::meshes::Meshes;
-use crate::view::reload::Source;
+use crate::view::reload::{Setting, Source};
 use crate::view::script;
 use crate::view::stage::{Look, Scene, Stage};
 use crate::view::studio::Studio;
@@ -37,10 +37,10 @@ Examples:
   lanecast view scene.kdl --camera side --spp 16
   lanecast view model.ply --headless-script orbit.txt
 
-Drag to orbit, wheel to zoom, F1 for all keys. The scene is opened anew when a file in its folder changes.
+Drag to orbit, wheel to zoom, V for sliders of the scene's parameters, F1 for all keys. The scene is opened anew when a file in its folder changes.
 A script has one command per line (docs/VIEW.md): orbit, turn, pan, zoom, fly, widen, fov, camera, reset, integrator,
-engine, heat, exposure, spp, blocks, wait, frame, spin, click, save, reload. What wait, frame, spin, click and reload
-find is printed as one JSON object per line.";
+engine, heat, exposure, spp, blocks, wait, frame, spin, click, save, set, reload. What wait, frame, spin, click, set and
+reload find is printed as one JSON object per line.";
 
 /// Arguments of `lanecast view`.
 #[derive(Debug, clap::Args)]
@@ -110,7 +110,9 @@ fn source(args: &SceneArgs) -> Result<Source> {
     let (name, options) = (args.scene.clone(), args.options.clone());
     let file = (!name.starts_with("builtin:")).then(|| PathBuf::from(&name));
     let meshes = Meshes::default();
-    let open = move |before: Option<&dyn Stage>| {
+    let open = move |settings: &[Setting], before: Option<&dyn Stage>| {
+        let set = options.set.iter().chain(settings).cloned().collect();
+        let options = SceneOptions { set, ..options.clone() };
         let description = options.load_with(&name, &|path, references| meshes.read(path, references))?;
         if before.is_some_and(|before| before.description().hash == description.hash) {
             return Ok(None);

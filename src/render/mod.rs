@@ -2,6 +2,7 @@
 
 mod aov;
 mod options;
+mod patch;
 mod pixels;
 pub mod progressive;
 mod scheduler;

@@ -6,12 +6,15 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use super::aov::Channel;
 use super::options::{Progress, RenderOptions, rect_of};
-use super::pixels::{Painter, add, mean, variance};
+use super::patch::{Patch, channels, empty_film};
+use super::pixels::{add, mean, variance};
 use super::tally::Tally;
 use crate::camera::{Camera, PixelRect, Tiling, fill_tile, morton_decode};
 use crate::error::Result;
 use crate::film::Film;
+use crate::film::Window;
 use crate::lanes::Real;
 use crate::ray::{Counters, Rays};
 use crate::scene::description::Description;
@@ -82,22 +85,24 @@ pub fn render_with<S: Real>(
     let start = Instant::now();
     let shader =
         Shader::new(world, description, engine, headlight(camera), options.settings()).with_rt(description, camera);
-    let job = Job { shader, camera, tiling, rect: rect_of(window), options, progress, start };
+    let channels = channels(&options.aovs);
+    let film = Mutex::new(empty_film((options.width, options.height), window, &channels));
+    let job = Job { shader, camera, tiling, rect: rect_of(window), window, channels, options, progress, start };
     let tiles = tiling.tiles_in(job.rect);
-    let painter = Mutex::new(Painter::new(options.width, options.height, window, &options.aovs));
-    let painter_of = |painter: &Mutex<Painter>, sums: &Sums, pixels: &[(u32, u32)]| {
-        job.paint(sums, pixels, &mut painter.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
+    let paint = |sums: &Sums, pixels: &[(u32, u32)], patch: &mut Patch| {
+        job.fill(patch, sums, pixels);
+        patch.paint(&mut film.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
         progress.tile_done(tiles.len() as u64);
     };
     let tally = if options.is_adaptive() {
-        job.rounds(&tiles, |sums, pixels| painter_of(&painter, sums, pixels))
+        job.rounds(&tiles, paint)
     } else {
         let one_tile = |memory: &mut TileMemory<S>, &tile: &u32| {
             let mut sums = take(&mut memory.sums);
             sums.start(job.tiling.rays_per_tile());
             let finished = job.samples(tile, options.spp, &mut sums, memory);
             if finished {
-                painter_of(&painter, &sums, &memory.pixels);
+                paint(&sums, &memory.pixels, &mut memory.patch);
             }
             memory.sums = sums;
             Tally::take(&mut memory.work, u64::from(finished))
@@ -105,7 +110,7 @@ pub fn render_with<S: Real>(
         tiles.par_iter().map_init(TileMemory::default, one_tile).reduce(Tally::default, Tally::plus)
     };
     Ok(RenderOutput {
-        film: painter.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()).film,
+        film: film.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()),
         rays: tally.rays,
         seconds: start.elapsed().as_secs_f64(),
         counters: tally.counters,
@@ -121,6 +126,8 @@ struct Job<'a, S: Real> {
     camera: &'a Camera,
     tiling: Tiling,
     rect: PixelRect,
+    window: Window,
+    channels: Vec<Channel>,
     options: &'a RenderOptions,
     progress: &'a dyn Progress,
     start: Instant,
@@ -159,6 +166,7 @@ struct TileMemory<S> {
     pixels: Vec<(u32, u32)>,
     samples: Vec<Sample>,
     sums: Sums,
+    patch: Patch,
 }
 
 impl<S: Real> Default for TileMemory<S> {
@@ -169,6 +177,7 @@ impl<S: Real> Default for TileMemory<S> {
             pixels: Vec::new(),
             samples: Vec::new(),
             sums: Sums::default(),
+            patch: Patch::default(),
         }
     }
 }
@@ -205,7 +214,7 @@ impl<S: Real> Job<'_, S> {
 
     /// Rounds over all tiles, each doubling the samples, until all have the wanted samples or little noise, or the
     /// time is over. Then calls `paint` for each tile that has samples.
-    fn rounds(&self, tiles: &[u32], paint: impl Fn(&Sums, &[(u32, u32)]) + Sync) -> Tally {
+    fn rounds(&self, tiles: &[u32], paint: impl Fn(&Sums, &[(u32, u32)], &mut Patch) + Sync) -> Tally {
         let (spp, limit) = (self.options.spp, self.options.time_limit.unwrap_or(f64::INFINITY));
         let in_time = || self.start.elapsed().as_secs_f64() < limit;
         let mut states: Vec<(u32, Sums, bool)> = tiles.iter().map(|&tile| (tile, Sums::default(), false)).collect();
@@ -241,17 +250,16 @@ impl<S: Real> Job<'_, S> {
                 return Tally::default();
             }
             self.list_pixels(*tile, &mut memory.pixels);
-            paint(sums, &memory.pixels);
+            paint(sums, &memory.pixels, &mut memory.patch);
             Tally { done: 1, ..Tally::default() }
         };
         let painted = states.par_iter().map_init(TileMemory::default, finished);
         total.plus(painted.reduce(Tally::default, Tally::plus))
     }
 
-    /// Puts the finished tile's pixels into the film.
-    fn paint(&self, sums: &Sums, pixels: &[(u32, u32)], painter: &mut Painter) {
-        for (sum, &(x, y)) in sums.pixels.iter().zip(pixels) {
-            painter.put(x, y, &mean(sum, sums.count));
-        }
+    /// Takes what the planes get from a finished tile.
+    fn fill(&self, patch: &mut Patch, sums: &Sums, pixels: &[(u32, u32)]) {
+        let means = sums.pixels.iter().map(|sum| mean(sum, sums.count));
+        patch.fill(&self.channels, self.window, pixels.iter().copied().zip(means));
     }
 }

@@ -12,6 +12,7 @@ use glam::{DAffine3, DVec3};
 use super::brlcad::describe::Looks;
 use super::light::Environment;
 use super::mesh::Mesh;
+use super::parameter::Parameter;
 use super::solids::SolidTree;
 use super::texture::Texture;
 
@@ -56,6 +57,8 @@ pub struct Description {
     pub precision: Option<Precision>,
     /// Looks of a BRL-CAD database's regions, which only its own lighting model knows; object 0 has a part for each.
     pub looks: Option<Arc<Looks>>,
+    /// Numbers of the scene that `--set` changes, in the order they were written.
+    pub parameters: Vec<Parameter>,
     /// Things worth telling the user (`info` prints them): ignored statements, unknown properties.
     pub warnings: Vec<String>,
 }
@@ -171,6 +174,7 @@ impl Description {
             ambient: DVec3::splat(0.1),
             precision: None,
             looks: None,
+            parameters: Vec::new(),
             warnings: Vec::new(),
         }
     }

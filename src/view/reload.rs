@@ -1,37 +1,40 @@
-//! Scenes that are opened anew when one of their files changes.
+//! Scenes that are opened anew when one of their files changes, or one of their parameters is set.
 //!
 //! A scene refers to files of its own folder, so that folder is watched as a whole; whether a change matters is told by the
 //! scene's hash, which covers every file that determines it.
 
-use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::sync::{Arc, Mutex};
+use std::path::Path;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use notify::{Event, EventKind, RecommendedWatcher, RecursiveMode, Watcher};
 
 use super::stage::Stage;
 use crate::error::{Error, Result};
+use crate::scene::parameter::Parameter;
 
 /// A save is over when nothing happened for so long: editors write in several steps.
 const QUIET: Duration = Duration::from_millis(5);
+/// Changes that do not end (a slider is dragged) are taken up after so long.
+const PATIENCE: Duration = Duration::from_millis(30);
 /// Time between two looks at whether to stop.
 const POLL: Duration = Duration::from_millis(20);
 
-/// Opens the scene, with the one before to build upon; `None` if it is the same.
-pub type Open = Box<dyn Fn(Option<&dyn Stage>) -> Result<Option<Arc<dyn Stage>>> + Send + Sync>;
+/// Name and value of a parameter, as `--set` gives them.
+pub type Setting = (String, String);
+
+/// Opens the scene with the parameters set, and the one before to build upon; `None` if it is the same.
+pub type Open = Box<dyn Fn(&[Setting], Option<&dyn Stage>) -> Result<Option<Arc<dyn Stage>>> + Send + Sync>;
 
 /// Where a scene comes from.
 pub struct Source {
     open: Open,
-    watch: Option<Watch>,
-}
-
-struct Watch {
-    /// Kept alive: it ends with this.
-    _watcher: RecommendedWatcher,
-    events: Mutex<Receiver<Instant>>,
-    file: PathBuf,
+    settings: Mutex<Vec<Setting>>,
+    changed: Sender<Instant>,
+    changes: Mutex<Receiver<Instant>>,
+    /// Watches the files; it ends with this.
+    watcher: Option<RecommendedWatcher>,
 }
 
 impl Source {
@@ -40,7 +43,9 @@ impl Source {
     /// # Errors
     /// What the system says if it cannot watch the file's folder.
     pub fn new(open: Open, file: Option<&Path>) -> Result<Self> {
-        Ok(Self { open, watch: file.map(watch).transpose()? })
+        let (changed, changes) = channel();
+        let watcher = file.map(|file| watch(file, changed.clone())).transpose()?;
+        Ok(Self { open, settings: Mutex::default(), changed, changes: Mutex::new(changes), watcher })
     }
 
     /// Opens the scene, reusing what it can of `before`; `None` if it has not changed.
@@ -48,44 +53,65 @@ impl Source {
     /// # Errors
     /// Those of opening.
     pub fn open(&self, before: Option<&dyn Stage>) -> Result<Option<Arc<dyn Stage>>> {
-        (self.open)(before)
+        let settings = locked(&self.settings).clone();
+        (self.open)(&settings, before)
     }
 
-    /// Waits until a file in the scene's folder has changed: when it was noticed first, or `None` at `limit` or when
-    /// `stopped` says so.
-    ///
-    /// # Errors
-    /// A usage error if the scene has no file.
-    pub fn wait(&self, limit: Instant, stopped: fn() -> bool) -> Result<Option<Instant>> {
-        let Some(watch) = &self.watch else {
-            return Err(Error::Usage("the scene has no file that could change".into()));
+    /// Gives parameter `name` another value, which counts as a change.
+    pub fn set(&self, name: &str, value: f64) {
+        let mut settings = locked(&self.settings);
+        settings.retain(|(known, _)| known != name);
+        settings.push((name.into(), value.to_string()));
+        // The receiver lives as long as the sender.
+        let _always = self.changed.send(Instant::now());
+    }
+
+    /// Takes back what was set.
+    pub fn unset(&self) {
+        locked(&self.settings).clear();
+        let _always = self.changed.send(Instant::now());
+    }
+
+    /// The parameters of `stage` as they are wanted by now.
+    pub fn parameters(&self, stage: &dyn Stage) -> Vec<Parameter> {
+        let settings = locked(&self.settings);
+        let wanted = |parameter: &Parameter| {
+            let set = settings.iter().find(|(name, _)| *name == parameter.name);
+            let value = set.and_then(|(_, text)| text.parse().ok()).unwrap_or(parameter.value);
+            Parameter { value, ..parameter.clone() }
         };
-        let events = watch.events.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        stage.description().parameters.iter().map(wanted).collect()
+    }
+
+    /// Waits until a file in the scene's folder has changed or a parameter is set: when that was noticed first, or `None`
+    /// at `limit` or when `stopped` says so.
+    pub fn wait(&self, limit: Instant, stopped: fn() -> bool) -> Option<Instant> {
+        let changes = locked(&self.changes);
         loop {
             let left = limit.saturating_duration_since(Instant::now());
-            match events.recv_timeout(left.min(POLL)) {
+            match changes.recv_timeout(left.min(POLL)) {
                 Ok(first) => {
-                    while events.recv_timeout(QUIET).is_ok() {}
-                    return Ok(Some(first));
+                    while first.elapsed() < PATIENCE && changes.recv_timeout(QUIET).is_ok() {}
+                    return Some(first);
                 }
                 Err(RecvTimeoutError::Timeout) if left > Duration::ZERO && !stopped() => {}
-                Err(RecvTimeoutError::Timeout) => return Ok(None),
-                Err(RecvTimeoutError::Disconnected) => {
-                    return Err(Error::io(&watch.file, std::io::Error::other("the system watches it no longer")));
-                }
+                Err(_) => return None,
             }
         }
     }
 
-    /// Whether the scene can change.
+    /// Whether the scene has a file that can change.
     pub fn is_watched(&self) -> bool {
-        self.watch.is_some()
+        self.watcher.is_some()
     }
 }
 
-fn watch(file: &Path) -> Result<Watch> {
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+fn watch(file: &Path, sender: Sender<Instant>) -> Result<RecommendedWatcher> {
     let failed = |e: notify::Error| Error::io(file, std::io::Error::other(e));
-    let (sender, events) = channel();
     let changed = move |event: notify::Result<Event>| {
         let matters = |event: &Event| {
             matches!(event.kind, EventKind::Create(_) | EventKind::Modify(_) | EventKind::Remove(_) | EventKind::Any)
@@ -101,5 +127,5 @@ fn watch(file: &Path) -> Result<Watch> {
         _ => Path::new("."),
     };
     watcher.watch(folder, RecursiveMode::Recursive).map_err(failed)?;
-    Ok(Watch { _watcher: watcher, events: Mutex::new(events), file: file.into() })
+    Ok(watcher)
 }

@@ -24,6 +24,8 @@ pub enum Step {
     Click(u32, u32),
     /// Write the picture as it is.
     Save(PathBuf),
+    /// Give a parameter of the scene another value and open the scene anew.
+    Set(String, f64),
     /// Wait at most so many seconds until the scene's files change, then open it anew.
     Reload(f64),
 }
@@ -38,7 +40,7 @@ pub struct Line {
 }
 
 /// Names of the commands, what follows them, for messages and docs.
-const COMMANDS: [(&str, &str); 21] = [
+const COMMANDS: [(&str, &str); 22] = [
     ("orbit", "RIGHT UP (degrees)"),
     ("turn", "RIGHT UP (degrees)"),
     ("pan", "RIGHT UP (picture heights)"),
@@ -59,6 +61,7 @@ const COMMANDS: [(&str, &str); 21] = [
     ("spin", "FRAMES DEGREES MILLISECONDS"),
     ("click", "X Y"),
     ("save", "FILE"),
+    ("set", "PARAMETER VALUE"),
     ("reload", "SECONDS"),
 ];
 
@@ -149,6 +152,7 @@ fn step(name: &str, words: &mut Words<'_>) -> std::result::Result<Step, Fault> {
         "spin" => Step::Spin(values.whole()?, values.number()?, values.time()?),
         "click" => Step::Click(values.whole()?, values.whole()?),
         "save" => Step::Save(values.word()?.into()),
+        "set" => Step::Set(values.word()?.into(), values.number()?),
         _ => Step::Reload(values.time()?),
     })
 }
@@ -198,8 +202,7 @@ mod tests {
 
     #[test]
     fn commands_are_read() {
-        let text =
-            "# a comment\norbit 30 -10.5 # turn\n\n  fly 0 0 1\nheat lanes\nheat off\nclick 3 4\nsave a.png\nreload 2";
+        let text = "# a comment\norbit 30 -10.5 # turn\n\n  fly 0 0 1\nheat lanes\nheat off\nclick 3 4\nsave a.png\nset hole.radius 5\nreload 2";
         let want = [
             (2, Step::Do(Action::Orbit(30.0, -10.5))),
             (4, Step::Do(Action::Fly(0.0, 0.0, 1.0))),
@@ -207,7 +210,8 @@ mod tests {
             (6, Step::Do(Action::Heat(None))),
             (7, Step::Click(3, 4)),
             (8, Step::Save("a.png".into())),
-            (9, Step::Reload(2.0)),
+            (9, Step::Set("hole.radius".into(), 5.0)),
+            (10, Step::Reload(2.0)),
         ];
         assert_eq!(script(text).unwrap(), want.map(|(line, step)| Line { line, step }));
         assert_eq!(script("").unwrap(), []);

@@ -118,7 +118,14 @@ impl Studio<'_> {
                 (self.save)(path, &output.film, &self.view)?;
                 None
             }
-            Step::Reload(seconds) => Some(self.reload(*seconds, last)?),
+            Step::Reload(_) if !self.source.is_watched() => {
+                return Err(Error::Usage("the scene has no file that could change".into()));
+            }
+            Step::Reload(seconds) => Some(self.reload("reload", Duration::from_secs_f64(*seconds), last)?),
+            Step::Set(name, value) => {
+                self.source.set(name, *value);
+                Some(self.reload("set", Duration::ZERO, last)?)
+            }
         })
     }
 
@@ -167,11 +174,11 @@ impl Studio<'_> {
     }
 
     /// Waits for a change, opens the scene anew, and makes the first picture of it. An error keeps what there was.
-    fn reload(&mut self, seconds: f64, last: &mut Option<RenderOutput>) -> Result<Value> {
-        let limit = Instant::now() + Duration::from_secs_f64(seconds);
+    fn reload(&mut self, command: &str, patience: Duration, last: &mut Option<RenderOutput>) -> Result<Value> {
+        let limit = Instant::now() + patience;
         loop {
-            let Some(changed) = self.source.wait(limit, self.stopped)? else {
-                return Ok(json!({ "command": "reload", "changed": false }));
+            let Some(changed) = self.source.wait(limit, self.stopped) else {
+                return Ok(json!({ "command": command, "changed": false }));
             };
             let clock = Instant::now();
             let stage = match self.source.open(Some(&*self.stage)) {
@@ -179,7 +186,7 @@ impl Studio<'_> {
                 Ok(None) => continue,
                 Ok(Some(stage)) => stage,
                 Err(error) => {
-                    return Ok(json!({ "command": "reload", "changed": true, "error": error.to_string() }));
+                    return Ok(json!({ "command": command, "changed": true, "error": error.to_string() }));
                 }
             };
             self.stage = stage;
@@ -189,7 +196,7 @@ impl Studio<'_> {
             let since_save = changed.elapsed().as_secs_f64() - (made.output.seconds - first);
             *last = Some(made.output);
             return Ok(json!({
-                "command": "reload",
+                "command": command,
                 "changed": true,
                 "open_seconds": open_seconds,
                 "build_seconds": self.stage.build_seconds(),

@@ -1,12 +1,11 @@
 //! A film that remembers which of its pixels are set, and what stands for those that are not.
 
-use super::super::pixels::Painter;
+use super::super::patch::Patch;
 use crate::film::{Film, PlaneData, Window};
-use crate::shade::Sample;
 
 /// Pixels of a picture in the making.
 pub struct Framebuffer {
-    painter: Painter,
+    film: Film,
     /// By pixel of the window, row by row.
     set: Vec<bool>,
     /// Edge of the first blocks, pixels.
@@ -16,19 +15,19 @@ pub struct Framebuffer {
 }
 
 impl Framebuffer {
-    pub(super) fn new(painter: Painter, start: u32) -> Self {
-        let left = painter.film.window.area();
-        Self { painter, set: vec![false; left as usize], start, left }
+    pub(super) fn new(film: Film, start: u32) -> Self {
+        let left = film.window.area();
+        Self { film, set: vec![false; left as usize], start, left }
     }
 
     /// The planes. Pixels that are not set are misses in a black world here; [`Self::shown`] says what stands for them.
     pub fn film(&self) -> &Film {
-        &self.painter.film
+        &self.film
     }
 
     /// The part of the picture that the planes cover.
     pub fn window(&self) -> Window {
-        self.painter.film.window
+        self.film.window
     }
 
     /// Whether pixel (x, y) of the picture is set; false outside of the window.
@@ -62,12 +61,13 @@ impl Framebuffer {
         None
     }
 
-    /// Sets pixel (x, y) of the window; a later call changes its value (further samples).
-    pub(super) fn put(&mut self, x: u32, y: u32, pixel: &Sample) {
-        let Some(index) = self.window().index(x, y) else { return };
-        self.left -= u64::from(!self.set[index]);
-        self.set[index] = true;
-        self.painter.put(x, y, pixel);
+    /// Sets pixels; a later call changes their values (further samples).
+    pub(super) fn paint(&mut self, patch: &Patch) {
+        for &place in patch.places() {
+            self.left -= u64::from(!self.set[place]);
+            self.set[place] = true;
+        }
+        patch.paint(&mut self.film);
     }
 
     /// The picture as it is shown: pixels that are not set get the planes of their block.
@@ -80,7 +80,7 @@ impl Framebuffer {
                 .filter(|(own, _)| !self.set[*own])
                 .filter_map(|(own, (x, y))| Some((own, self.shown(x, y)?)))
                 .collect();
-            for plane in &mut self.painter.film.planes {
+            for plane in &mut self.film.planes {
                 // Sources are set, destinations are not: the order does not matter.
                 match &mut plane.data {
                     PlaneData::F32(data) => shown.iter().for_each(|&(to, from)| data[to] = data[from]),
@@ -88,7 +88,7 @@ impl Framebuffer {
                 }
             }
         }
-        self.painter.film
+        self.film
     }
 }
 
@@ -96,17 +96,25 @@ impl Framebuffer {
 mod tests {
     use glam::DVec3;
 
+    use super::super::super::patch::{channels, empty_film};
     use super::*;
+    use crate::shade::Sample;
 
     #[test]
     fn the_smallest_block_with_a_colour_is_shown() {
         let window = Window { x0: 3, y0: 5, x1: 12, y1: 14 };
-        let mut frame = Framebuffer::new(Painter::new(20, 20, window, &[]), 8);
-        let gray = |value: f64| Sample { radiance: DVec3::splat(value), ..Sample::MISS };
+        let channels = channels(&[]);
+        let mut frame = Framebuffer::new(empty_film((20, 20), window, &channels), 8);
+        let mut patch = Patch::default();
+        let mut put = |frame: &mut Framebuffer, pixel, value| {
+            let gray = Sample { radiance: DVec3::splat(value), ..Sample::MISS };
+            patch.fill(&channels, window, [(pixel, gray)]);
+            frame.paint(&patch);
+        };
         assert_eq!((frame.shown(3, 5), frame.left()), (None, 81));
-        frame.put(3, 5, &gray(1.0));
-        frame.put(7, 5, &gray(2.0));
-        frame.put(8, 6, &gray(3.0));
+        put(&mut frame, (3, 5), 1.0);
+        put(&mut frame, (7, 5), 2.0);
+        put(&mut frame, (8, 6), 3.0);
         // Row of the window: dx = 0..8 belong to the first block of 8; the block of 4 at dx = 4 is set.
         let at = |x: u32, y: u32| frame.shown(x, y).map(|i| frame.film().f32_plane("R").unwrap()[i]);
         assert_eq!([at(3, 5), at(6, 12), at(7, 5), at(10, 8)], [Some(1.0), Some(1.0), Some(2.0), Some(2.0)]);

@@ -12,10 +12,11 @@
 
 mod framebuffer;
 mod steps;
+mod sums;
 
 use std::mem::take;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -23,8 +24,10 @@ use rayon::prelude::*;
 pub use framebuffer::Framebuffer;
 pub use steps::{LARGEST_BLOCK, Step};
 
+use super::aov::Channel;
 use super::options::{Progress, RenderOptions, rect_of};
-use super::pixels::{Painter, add, mean};
+use super::patch::{Patch, channels, empty_film};
+use super::pixels::{add, mean};
 use super::scheduler::RenderOutput;
 use super::tally::Tally;
 use crate::camera::{Camera, PixelRect, Tiling, fill_pixels, fill_tile, morton_decode};
@@ -37,6 +40,7 @@ use crate::scene::world::World;
 use crate::shade::{Sample, Shader, Workspace, headlight};
 use crate::trace::Engine;
 use steps::{Lattice, check_start, plan};
+use sums::Sums;
 
 /// Who looks at a picture in the making; called from all threads.
 pub trait Viewer: Sync {
@@ -62,20 +66,23 @@ pub struct Progressive<'a, S: Real> {
     start: u32,
     /// Tiles of the window, and what is known of each.
     tiles: Vec<(u32, Mutex<Tile>)>,
+    channels: Vec<Channel>,
     frame: Mutex<Framebuffer>,
     /// Batches of all steps.
     total: u64,
     tally: Tally,
     seconds: f64,
+    /// Whether there was a run before: pixels of any step may be set.
+    has_run: bool,
+    memories: Mutex<Vec<Memory<S>>>,
 }
 
 /// Samples of one tile.
-#[derive(Default)]
 struct Tile {
     /// Samples of each pixel.
     samples: u32,
-    /// Their sums in Morton order; empty while there is no use for them.
-    sums: Vec<Sample>,
+    /// Their sums, in Morton order.
+    sums: Sums,
 }
 
 /// One thread's arrays.
@@ -84,12 +91,33 @@ struct Memory<S> {
     work: Workspace<S>,
     pixels: Vec<(u32, u32)>,
     samples: Vec<Sample>,
+    patch: Patch,
 }
 
 impl<S: Real> Default for Memory<S> {
     fn default() -> Self {
         let (rays, work) = (Rays::new(0), Workspace::default());
-        Self { rays, work, pixels: Vec::new(), samples: Vec::new() }
+        Self { rays, work, pixels: Vec::new(), samples: Vec::new(), patch: Patch::default() }
+    }
+}
+
+/// Arrays lent to a thread for a step. Threads come and go with each piece of work that is split off; memory that was never
+/// touched before is dear.
+struct Lent<'p, S: Real> {
+    all: &'p Mutex<Vec<Memory<S>>>,
+    memory: Memory<S>,
+}
+
+impl<'p, S: Real> Lent<'p, S> {
+    fn from(all: &'p Mutex<Vec<Memory<S>>>) -> Self {
+        let memory = locked(all).pop().unwrap_or_default();
+        Self { all, memory }
+    }
+}
+
+impl<S: Real> Drop for Lent<'_, S> {
+    fn drop(&mut self) {
+        locked(self.all).push(take(&mut self.memory));
     }
 }
 
@@ -123,18 +151,20 @@ impl<'a, S: Real> Progressive<'a, S> {
         }
         let settings = options.settings();
         let start = if settings.cost || !engine.is_exact() { 1 } else { start };
-        let painter = Painter::new(options.width, options.height, window, &options.aovs);
+        let channels = channels(&options.aovs);
+        let film = empty_film((options.width, options.height), window, &channels);
         let shader = Shader::new(world, description, engine, headlight(camera), settings).with_rt(description, camera);
         let rect = rect_of(window);
         let first = u32::from(start > 1);
-        let tile = |number| (number, Mutex::new(Tile { samples: first, sums: Vec::new() }));
+        let only_color = options.aovs.is_empty();
+        let tile = |number| (number, Mutex::new(Tile { samples: first, sums: Sums::new(only_color) }));
         let tiles: Vec<_> = tiling.tiles_in(rect).into_iter().map(tile).collect();
         let batches = |step: &Step| match *step {
             Step::Blocks(block) => u64::from(lattice(window, &tiling, block, start).batches_with_pixels()),
             Step::Samples(_) => tiles.len() as u64,
         };
         let total = plan(start, options.spp).iter().map(batches).sum();
-        let frame = Mutex::new(Framebuffer::new(painter, start));
+        let frame = Mutex::new(Framebuffer::new(film, start));
         Ok(Self {
             shader,
             camera,
@@ -144,10 +174,13 @@ impl<'a, S: Real> Progressive<'a, S> {
             rect,
             start,
             tiles,
+            channels,
             frame,
             total,
             tally: Tally::default(),
             seconds: 0.0,
+            has_run: false,
+            memories: Mutex::default(),
         })
     }
 
@@ -170,6 +203,7 @@ impl<'a, S: Real> Progressive<'a, S> {
             }
             viewer.step_done(&locked(&self.frame), step);
         }
+        self.has_run = true;
         self.seconds += clock.elapsed().as_secs_f64();
         finished
     }
@@ -195,10 +229,11 @@ impl<'a, S: Real> Progressive<'a, S> {
     /// One ray for each block that has none.
     fn blocks(&self, block: u32, watch: Watch<'_>, stopped: &AtomicBool) -> Tally {
         let lattice = lattice(self.window, &self.tiling, block, self.start);
-        let one = |memory: &mut Memory<S>, batch: u32| {
+        let one = |lent: &mut Lent<'_, S>, batch: u32| {
+            let memory = &mut lent.memory;
             memory.pixels.clear();
             memory.pixels.extend(lattice.pixels(batch));
-            if self.tally.done > 0 {
+            if self.has_run {
                 let frame = locked(&self.frame);
                 memory.pixels.retain(|&(x, y)| !frame.is_set(x, y));
             }
@@ -208,39 +243,48 @@ impl<'a, S: Real> Progressive<'a, S> {
             let size = (self.options.width, self.options.height);
             fill_pixels(self.camera, size, &memory.pixels, self.options.sub_pixel(0), &mut memory.rays);
             self.shader.shade(&memory.rays, &memory.pixels, 0, &mut memory.work, &mut memory.samples);
-            for (&(x, y), sample) in memory.pixels.iter().zip(&memory.samples) {
-                self.keep_first(x, y, sample);
+            if self.options.spp > 1 {
+                self.keep_first(&memory.pixels, &memory.samples);
             }
-            let frame = &mut *locked(&self.frame);
-            for (&(x, y), sample) in memory.pixels.iter().zip(&memory.samples) {
+            let first = |sample: &Sample| {
                 let mut sum = Sample::MISS;
                 add(&mut sum, sample);
-                frame.put(x, y, &mean(&sum, 1));
-            }
+                mean(&sum, 1)
+            };
+            let values = memory.pixels.iter().copied().zip(memory.samples.iter().map(first));
+            memory.patch.fill(&self.channels, self.window, values);
+            let frame = &mut *locked(&self.frame);
+            frame.paint(&memory.patch);
             self.told(watch, frame, lattice.part(batch), memory)
         };
         let batches = (0..lattice.batches()).into_par_iter();
-        batches.map_init(Memory::default, one).reduce(Tally::default, Tally::plus)
+        batches.map_init(|| Lent::from(&self.memories), one).reduce(Tally::default, Tally::plus)
     }
 
-    /// Keeps a pixel's first sample for those to come.
-    fn keep_first(&self, x: u32, y: u32, sample: &Sample) {
-        if self.options.spp == 1 {
-            return;
+    /// Keeps the first samples of pixels for those to come.
+    fn keep_first(&self, pixels: &[(u32, u32)], samples: &[Sample]) {
+        let per_tile = self.tiling.rays_per_tile();
+        // The lock of a tile is kept while its pixels come: with small blocks they come together.
+        let mut held: Option<(u32, MutexGuard<'_, Tile>)> = None;
+        for (&(x, y), sample) in pixels.iter().zip(samples) {
+            let index = self.tiling.index(x, y);
+            let number = (index / u64::from(per_tile)) as u32;
+            if held.as_ref().is_none_or(|(held, _)| *held != number) {
+                drop(held.take());
+                let Ok(place) = self.tiles.binary_search_by_key(&number, |(number, _)| *number) else { continue };
+                held = Some((number, locked(&self.tiles[place].1)));
+            }
+            if let Some((_, tile)) = &mut held {
+                tile.sums.make_room(per_tile as usize);
+                tile.sums.add((index % u64::from(per_tile)) as usize, sample);
+            }
         }
-        let per_tile = u64::from(self.tiling.rays_per_tile());
-        let index = self.tiling.index(x, y);
-        let Ok(place) = self.tiles.binary_search_by_key(&((index / per_tile) as u32), |(number, _)| *number) else {
-            return;
-        };
-        let tile = &mut *locked(&self.tiles[place].1);
-        tile.sums.resize(per_tile as usize, Sample::MISS);
-        add(&mut tile.sums[(index % per_tile) as usize], sample);
     }
 
     /// Whole tiles until each pixel has `samples` samples.
     fn samples(&self, samples: u32, watch: Watch<'_>, stopped: &AtomicBool) -> Tally {
-        let one = |memory: &mut Memory<S>, (number, tile): &(u32, Mutex<Tile>)| {
+        let one = |lent: &mut Lent<'_, S>, (number, tile): &(u32, Mutex<Tile>)| {
+            let memory = &mut lent.memory;
             let tile = &mut *locked(tile);
             if tile.samples >= samples {
                 return Tally::default();
@@ -249,31 +293,31 @@ impl<'a, S: Real> Progressive<'a, S> {
             let (x0, y0) = self.tiling.origin(*number);
             memory.pixels.clear();
             memory.pixels.extend((0..count).map(morton_decode).map(|(dx, dy)| (x0 + dx, y0 + dy)));
-            tile.sums.resize(count as usize, Sample::MISS);
+            tile.sums.make_room(count as usize);
             while tile.samples < samples {
                 if stop(watch, stopped) {
                     return Tally::take(&mut memory.work, 0);
                 }
                 let sub_pixel = self.options.sub_pixel(tile.samples);
                 fill_tile(self.camera, &self.tiling, *number, self.rect, sub_pixel, &mut memory.rays);
-                let Memory { rays, work, pixels, samples: seen } = memory;
+                let Memory { rays, work, pixels, samples: seen, .. } = memory;
                 self.shader.shade(rays, pixels, tile.samples, work, seen);
-                tile.sums.iter_mut().zip(seen).for_each(|(sum, sample)| add(sum, sample));
+                tile.sums.add_all(seen);
                 tile.samples += 1;
             }
+            let means = (0..memory.pixels.len()).map(|pixel| mean(&tile.sums.of(pixel), samples));
+            memory.patch.fill(&self.channels, self.window, memory.pixels.iter().copied().zip(means));
             let frame = &mut *locked(&self.frame);
-            for (&(x, y), sum) in memory.pixels.iter().zip(&tile.sums) {
-                frame.put(x, y, &mean(sum, samples));
-            }
+            frame.paint(&memory.patch);
             if samples == self.options.spp {
-                tile.sums = Vec::new();
+                tile.sums.free();
             }
             let edge = self.tiling.edge();
             let (x1, y1) = ((x0 + edge).min(self.window.x1), (y0 + edge).min(self.window.y1));
             let part = Window { x0: x0.max(self.window.x0), y0: y0.max(self.window.y0), x1, y1 };
             self.told(watch, frame, part, memory)
         };
-        self.tiles.par_iter().map_init(Memory::default, one).reduce(Tally::default, Tally::plus)
+        self.tiles.par_iter().map_init(|| Lent::from(&self.memories), one).reduce(Tally::default, Tally::plus)
     }
 
     /// Tells who watches of a batch that is painted, and sums it up.
@@ -295,6 +339,6 @@ fn stop(watch: Watch<'_>, stopped: &AtomicBool) -> bool {
     stop
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }

@@ -103,6 +103,7 @@ pub fn parse(
     let names: Vec<&str> = lowering.description.groups.iter().map(|g| g.name.as_str()).collect();
     cycles::check(source, &names, &lowering.links)?;
     let mut description = lowering.description;
+    description.parameters = lowering.scope.written;
     description.hash = hash(bytes, &lowering.store.digests, set);
     description.meshes = lowering.store.meshes;
     add_mesh_materials(&mut description);

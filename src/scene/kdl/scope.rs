@@ -7,6 +7,7 @@ use super::expression::{self, Names};
 use super::source::{Source, Span, near};
 use super::syntax::{Entry, Value};
 use crate::error::{Error, Result};
+use crate::scene::parameter::Parameter;
 
 /// Most steps (values read, characters of expressions evaluated, rounds of repeats) a document may take.
 const MAX_STEPS: u64 = 1 << 28;
@@ -18,6 +19,8 @@ pub struct Scope<'a> {
     pub source: Source<'a>,
     /// Parameters by name.
     pub parameters: BTreeMap<String, f64>,
+    /// The same in the order they were written, with their ranges; without the frame that every scene has.
+    pub written: Vec<Parameter>,
     /// Indices of the repeats around the statement at hand, outermost first.
     pub indices: Vec<(String, f64)>,
     steps: Cell<u64>,
@@ -38,7 +41,7 @@ impl Names for Scope<'_> {
 impl<'a> Scope<'a> {
     /// No names yet.
     pub fn new(source: Source<'a>) -> Self {
-        Self { source, parameters: BTreeMap::new(), indices: Vec::new(), steps: Cell::new(0) }
+        Self { source, parameters: BTreeMap::new(), written: Vec::new(), indices: Vec::new(), steps: Cell::new(0) }
     }
 
     /// Counts work done for the statement at `span`.

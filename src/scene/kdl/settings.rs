@@ -5,9 +5,10 @@ use glam::DVec3;
 use super::fields::{Fields, NO_REST, colour_from, numbers_of};
 use super::scope::Scope;
 use super::source::{Span, near, quote};
-use super::syntax::{Node, Value};
+use super::syntax::{Entry, Node, Value};
 use crate::error::{Error, Result};
 use crate::scene::description::{CameraDescription, Precision, Projection};
+use crate::scene::parameter::Parameter;
 
 /// Statements that belong to the top level.
 pub const NAMES: [&str; 10] =
@@ -96,15 +97,16 @@ pub fn set_value(scope: &Scope<'_>, name: &str, set: &[(String, String)]) -> Res
 }
 
 /// `parameter radius 1.5` or `parameter radius { key FRAME VALUE; ... }`, unless `set` gives another value: defines the
-/// name in `scope`.
+/// name in `scope`. `from=0.5 to=3 step=0.1` say what a slider offers.
 ///
 /// # Errors
-/// Names that are taken or not names, values that are not one number.
+/// Names that are taken or not names, values that are not one number, ranges that are none.
 pub fn parameter(scope: &mut Scope<'_>, node: &Node<'_>, set: &[(String, String)]) -> Result<()> {
-    let fields = Fields::collect(scope, node, &[], &["key"])?;
-    let (name_entry, value) = match (node.entries.as_slice(), fields.rest.is_empty()) {
-        ([name, value], true) => (name, Some(value)),
-        ([name], false) => (name, None),
+    let fields = Fields::collect(scope, node, &["from", "to", "step"], &["key"])?;
+    let values: Vec<&Entry<'_>> = node.entries.iter().filter(|entry| entry.name.is_none()).collect();
+    let (name_entry, value) = match (values.as_slice(), fields.rest.is_empty()) {
+        (&[name, value], true) => (name, Some(value)),
+        (&[name], false) => (name, None),
         _ => return Err(fields.error(NO_NUMBER)),
     };
     let Value::Text(name) = &name_entry.value else {
@@ -127,8 +129,20 @@ pub fn parameter(scope: &mut Scope<'_>, node: &Node<'_>, set: &[(String, String)
             _ => return Err(scope.source.error(value.span, "a parameter has one value")),
         },
     };
-    let number = set_value(scope, name, set)?.unwrap_or(number);
-    scope.parameters.insert(name.to_string(), number);
+    // What the file says sets the range where nothing else does: it stays when the value is changed.
+    let mut parameter = Parameter::new(name, number);
+    let (low, high) = parameter.range;
+    parameter.range = (fields.number("from")?.unwrap_or(low), fields.number("to")?.unwrap_or(high));
+    if parameter.range.0 >= parameter.range.1 {
+        let (low, high) = parameter.range;
+        return Err(fields.error(format!("a slider from {low} to {high}: expected `from` below `to`")));
+    }
+    if fields.has("step") {
+        parameter.step = fields.positive("step", 1.0)?;
+    }
+    parameter.value = set_value(scope, name, set)?.unwrap_or(number);
+    scope.parameters.insert(name.to_string(), parameter.value);
+    scope.written.push(parameter);
     Ok(())
 }
 

@@ -173,6 +173,22 @@ fn set_changes_parameters_and_the_hash() {
 }
 
 #[test]
+fn parameters_say_what_sliders_offer() {
+    let text = "parameter a 3 from=1 to=\"2 * 4\" step=0.5\nparameter b -2\nparameter c { key 0 1; key 9 2 }";
+    let parameters = scene_with(text, &[("a", "9")]).unwrap().parameters;
+    let told: Vec<_> = parameters.iter().map(|p| (p.name.as_str(), p.value, p.range, p.step)).collect();
+    assert_eq!(told, [("a", 9.0, (1.0, 8.0), 0.5), ("b", -2.0, (-4.0, 0.0), 0.0), ("c", 1.0, (0.0, 2.0), 0.0)]);
+    for (text, want) in [
+        ("parameter a 3 from=5 to=4", "t.kdl:1:1: a slider from 5 to 4: expected `from` below `to`"),
+        ("parameter a 3 step=0", "t.kdl:1:15: "),
+        ("parameter a 3 form=5", "t.kdl:1:15: `parameter` has no property `form`"),
+    ] {
+        let error = scene_with(text, &[]).unwrap_err().to_string();
+        assert!(error.starts_with(want), "{error}");
+    }
+}
+
+#[test]
 fn mesh_files_are_read_once_and_bring_their_materials() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.ply"), "").unwrap();

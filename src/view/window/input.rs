@@ -19,7 +19,7 @@ const WHEEL_PIXELS: f64 = 40.0;
 const CLICK: f64 = 3.0;
 
 /// The keys, for the help over the picture.
-pub const HELP: [&str; 11] = [
+pub const HELP: [&str; 12] = [
     "drag: orbit    right drag: turn    middle or shift drag: pan    wheel: zoom    click: what is there",
     "arrows: orbit    W A S D, page up, page down: fly    [ ]: field of view    Home: back",
     "I: integrator (1 whitted, 2 ao, 3 normals, 4 depth, 5 cost)",
@@ -28,6 +28,7 @@ pub const HELP: [&str; 11] = [
     "C: next camera",
     "+ -: exposure",
     ", .: fewer, more samples per pixel",
+    "V: sliders for the scene's parameters    R: all as the file says",
     "P: save PNG    X: save EXR",
     "Tab: text on and off    F1: this help",
     "Q or Escape: quit",
@@ -44,6 +45,10 @@ pub enum Request {
     Pick(f64, f64),
     /// Write the picture: the extension.
     Save(&'static str),
+    /// Sliders on or off.
+    Sliders,
+    /// All parameters as the scene says.
+    Unset,
     /// Text on or off.
     Text,
     /// Help on or off.
@@ -88,6 +93,8 @@ pub fn key(key: &Key) -> Option<Request> {
             "-" => act(Action::Exposure(-0.5)),
             "," => Some(Request::MoreSamples(false)),
             "." => Some(Request::MoreSamples(true)),
+            "v" => Some(Request::Sliders),
+            "r" => Some(Request::Unset),
             "p" => Some(Request::Save("png")),
             "x" => Some(Request::Save("exr")),
             "q" => Some(Request::Quit),
@@ -125,6 +132,11 @@ impl Pointer {
             MouseButton::Right => Action::Turn(right * DRAG_DEGREES * 0.5, -down * DRAG_DEGREES * 0.5),
             _ => Action::Pan(right, -down),
         }))
+    }
+
+    /// Where the pointer is, pixels.
+    pub fn place(&self) -> (f64, f64) {
+        self.place
     }
 
     /// A button goes down or up.

@@ -2,6 +2,7 @@
 
 mod input;
 pub mod live;
+mod panel;
 mod screen;
 mod surface;
 mod worker;
@@ -11,11 +12,12 @@ use std::time::{Duration, Instant};
 
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
-use winit::event::{ElementState, WindowEvent};
+use winit::event::{ElementState, MouseButton, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, EventLoop};
 use winit::window::WindowId;
 
 use super::action::Action;
+use super::reload::Source;
 use super::studio::{Save, Studio};
 use crate::error::{Error, Result};
 use input::{HELP, Pointer, Request};
@@ -50,20 +52,21 @@ pub fn open(studio: Studio<'_>, pool: &rayon::ThreadPool, name: &str) -> Result<
     let message = std::sync::Mutex::new(None);
     let mut app = App {
         shared: &shared,
+        source: studio.source,
         save: studio.save,
         name,
         shown: None,
         pointer: Pointer::default(),
         text: true,
         help: false,
+        sliders: false,
+        sliding: None,
         message: &message,
         failure: None,
     };
     std::thread::scope(|scope| {
         scope.spawn(|| shared.work(pool));
-        if studio.source.is_watched() {
-            scope.spawn(|| watch(&studio, &shared, pool, &message));
-        }
+        scope.spawn(|| watch(&studio, &shared, pool, &message));
         let ended = event_loop.run_app(&mut app);
         shared.quit();
         ended.map_err(|e| refused(&e))
@@ -71,14 +74,12 @@ pub fn open(studio: Studio<'_>, pool: &rayon::ThreadPool, name: &str) -> Result<
     app.failure.map_or(Ok(()), |what| Err(refused(&what)))
 }
 
-/// Opens the scene anew whenever its files change; an error is shown while the last good scene stays.
+/// Opens the scene anew whenever its files change or a slider moves; an error is shown while the last good scene stays.
 fn watch(studio: &Studio<'_>, shared: &Shared, pool: &rayon::ThreadPool, message: &std::sync::Mutex<Option<String>>) {
     let tell = |what: Option<String>| *message.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = what;
     while !shared.is_quitting() {
-        match studio.source.wait(Instant::now() + WATCH, studio.stopped) {
-            Ok(None) => continue,
-            Ok(Some(_)) => {}
-            Err(error) => return tell(Some(error.to_string())),
+        if studio.source.wait(Instant::now() + WATCH, studio.stopped).is_none() {
+            continue;
         }
         let before = shared.wanted().stage;
         match pool.install(|| studio.source.open(Some(&*before))) {
@@ -101,6 +102,7 @@ fn watch(studio: &Studio<'_>, shared: &Shared, pool: &rayon::ThreadPool, message
 
 struct App<'a> {
     shared: &'a Shared,
+    source: &'a Source,
     save: Save<'a>,
     name: &'a str,
     shown: Option<Surface>,
@@ -108,6 +110,9 @@ struct App<'a> {
     /// Whether the status line is shown, and the help.
     text: bool,
     help: bool,
+    sliders: bool,
+    /// The slider that is dragged.
+    sliding: Option<usize>,
     /// What was said last: a hit, an error.
     message: &'a std::sync::Mutex<Option<String>>,
     failure: Option<String>,
@@ -139,11 +144,34 @@ impl App<'_> {
             }
             Request::Pick(x, y) => self.pick(x, y),
             Request::Save(extension) => self.save_as(extension),
+            Request::Sliders => self.sliders = !self.sliders,
+            Request::Unset => self.source.unset(),
             Request::Text => self.text = !self.text,
             Request::Help => self.help = !self.help,
             Request::Quit => event_loop.exit(),
         }
         self.redraw();
+    }
+
+    /// The left button goes down: whether that is on a slider, which then follows the pointer.
+    fn grabs_slider(&mut self) -> bool {
+        let (x, y) = self.pointer.place();
+        let count = self.shared.wanted().stage.description().parameters.len();
+        self.sliding = if self.sliders { panel::slider_at(x, y, count) } else { None };
+        self.slide();
+        self.sliding.is_some()
+    }
+
+    /// Sets what the dragged slider sets.
+    fn slide(&self) {
+        let parameters = self.source.parameters(&*self.shared.wanted().stage);
+        if let Some(parameter) = self.sliding.and_then(|slider| parameters.get(slider)) {
+            let value = parameter.at(panel::share_at(self.pointer.place().0));
+            if value != parameter.value {
+                self.source.set(&parameter.name, value);
+                self.redraw();
+            }
+        }
     }
 
     fn pick(&self, x: f64, y: f64) {
@@ -197,6 +225,8 @@ impl App<'_> {
         let mut screen = self.shared.look(|shown| shown.screen.clone());
         if self.help {
             screen.write(0, &HELP);
+        } else if self.sliders {
+            panel::draw(&mut screen, &self.source.parameters(&*self.shared.wanted().stage));
         }
         if !self.text {
             return screen;
@@ -269,9 +299,19 @@ impl ApplicationHandler<Wake> for App<'_> {
             }
             WindowEvent::CursorMoved { position, .. } => {
                 let height = self.shown.as_ref().map_or(1.0, |surface| f64::from(surface.size().1));
-                self.pointer.moved(position.x, position.y, height)
+                let request = self.pointer.moved(position.x, position.y, height);
+                self.slide();
+                request
             }
-            WindowEvent::MouseInput { state, button, .. } => self.pointer.button(button, state),
+            WindowEvent::MouseInput { state: ElementState::Pressed, button: MouseButton::Left, .. }
+                if self.grabs_slider() =>
+            {
+                None
+            }
+            WindowEvent::MouseInput { state, button, .. } => {
+                self.sliding = None;
+                self.pointer.button(button, state)
+            }
             WindowEvent::MouseWheel { delta, .. } => Some(input::wheel(delta)),
             _ => None,
         };

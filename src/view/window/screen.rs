@@ -19,7 +19,7 @@ pub const LINE: u32 = 15;
 /// Width of a character, pixels.
 const CHARACTER: u32 = 7;
 /// Space left of the text, pixels.
-const MARGIN: u32 = 4;
+pub const MARGIN: u32 = 4;
 
 /// A picture ready for a display: rows from the top, 0x00RRGGBB.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -64,6 +64,14 @@ impl Screen {
             }
             let place = Point::new(MARGIN as i32, y0 as i32 + 1);
             let Ok(_) = Text::with_baseline(line, place, style, Baseline::Top).draw(self);
+        }
+    }
+
+    /// Fills the rectangle of `size` = (width, height) at `corner` = (x, y); what does not fit is cut off.
+    pub fn fill(&mut self, corner: (u32, u32), size: (u32, u32), color: u32) {
+        let [x0, x1] = [corner.0, corner.0 + size.0].map(|x| x.min(self.width));
+        for y in corner.1.min(self.height)..(corner.1 + size.1).min(self.height) {
+            self.pixels[(y * self.width + x0) as usize..(y * self.width + x1) as usize].fill(color);
         }
     }
 

@@ -1,0 +1,114 @@
+//! Pixels into planes.
+
+use super::aov::{Aov, COLOR, Channel, Get};
+use crate::film::{Film, Plane, PlaneData, Window};
+use crate::shade::Sample;
+
+/// The planes of a picture: colour, coverage, and those of `aovs`.
+pub(super) fn channels(aovs: &[Aov]) -> Vec<Channel> {
+    let extra = Aov::ALL.into_iter().filter(|aov| aovs.contains(aov)).flat_map(Aov::channels);
+    COLOR.iter().chain(extra).copied().collect()
+}
+
+/// A film of misses in a black world.
+pub(super) fn empty_film(size: (u32, u32), window: Window, channels: &[Channel]) -> Film {
+    let area = window.area() as usize;
+    let data = |channel: &Channel| match channel.get {
+        Get::F32(get) => PlaneData::F32(vec![get(&Sample::MISS) as f32; area]),
+        Get::U32(get) => PlaneData::U32(vec![get(&Sample::MISS); area]),
+    };
+    let planes = channels.iter().map(|channel| Plane { name: channel.name.to_string(), data: data(channel) }).collect();
+    Film { width: size.0, height: size.1, window, planes }
+}
+
+/// What the planes get from a batch of pixels: worked out before the film is locked, which is then a matter of copying.
+#[derive(Default)]
+pub(super) struct Patch {
+    /// Places in the planes.
+    places: Vec<usize>,
+    /// By channel: the value of each place.
+    values: Vec<PlaneData>,
+}
+
+impl Patch {
+    /// Takes the values of `pixels` that lie in `window`, and forgets earlier ones; `channels` are the same each time.
+    pub fn fill(
+        &mut self,
+        channels: &[Channel],
+        window: Window,
+        pixels: impl IntoIterator<Item = ((u32, u32), Sample)>,
+    ) {
+        self.places.clear();
+        for values in &mut self.values {
+            match values {
+                PlaneData::F32(values) => values.clear(),
+                PlaneData::U32(values) => values.clear(),
+            }
+        }
+        if self.values.is_empty() {
+            self.values.extend(channels.iter().map(|channel| match channel.get {
+                Get::F32(_) => PlaneData::F32(Vec::new()),
+                Get::U32(_) => PlaneData::U32(Vec::new()),
+            }));
+        }
+        for ((x, y), pixel) in pixels {
+            let Some(place) = window.index(x, y) else { continue };
+            self.places.push(place);
+            for (channel, values) in channels.iter().zip(&mut self.values) {
+                match (channel.get, values) {
+                    (Get::F32(get), PlaneData::F32(values)) => values.push(get(&pixel) as f32),
+                    (Get::U32(get), PlaneData::U32(values)) => values.push(get(&pixel)),
+                    _ => unreachable!("values are made from the channels"),
+                }
+            }
+        }
+    }
+
+    /// Places in the planes that it covers.
+    pub fn places(&self) -> &[usize] {
+        &self.places
+    }
+
+    /// Copies the values to `film`, which has the planes of the channels and the window that they were taken for.
+    pub fn paint(&self, film: &mut Film) {
+        for (plane, values) in film.planes.iter_mut().zip(&self.values) {
+            match (&mut plane.data, values) {
+                (PlaneData::F32(data), PlaneData::F32(values)) => copy(&self.places, values, data),
+                (PlaneData::U32(data), PlaneData::U32(values)) => copy(&self.places, values, data),
+                _ => unreachable!("planes are made from the channels"),
+            }
+        }
+    }
+}
+
+fn copy<T: Copy>(places: &[usize], values: &[T], data: &mut [T]) {
+    for (&place, &value) in places.iter().zip(values) {
+        data[place] = value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn planes_are_named_and_row_major_over_the_window() {
+        let window = Window { x0: 4, y0: 2, x1: 7, y1: 4 };
+        let channels = channels(&[Aov::Primitive, Aov::Z]);
+        let mut film = empty_film((10, 10), window, &channels);
+        let pixel = Sample { radiance: DVec3::new(1.0, 2.0, 3.0), alpha: 1.0, distance: 4.0, prim: 9, ..Sample::MISS };
+        let mut patch = Patch::default();
+        patch.fill(&channels, window, [((4, 2), pixel)]);
+        patch.fill(&channels, window, [((5, 3), pixel), ((7, 3), pixel), ((5, 4), pixel)]);
+        patch.paint(&mut film);
+        assert_eq!(patch.places(), [4]);
+        let names: Vec<&str> = film.planes.iter().map(|p| p.name.as_str()).collect();
+        assert_eq!(names, ["R", "G", "B", "A", "Z", "id.primitive"]);
+        let (inf, none) = (f32::INFINITY, u32::MAX);
+        assert_eq!(film.planes[2].data, PlaneData::F32(vec![0.0, 0.0, 0.0, 0.0, 3.0, 0.0]));
+        assert_eq!(film.planes[4].data, PlaneData::F32(vec![inf, inf, inf, inf, 4.0, inf]));
+        assert_eq!(film.planes[5].data, PlaneData::U32(vec![none, none, none, none, 9, none]));
+    }
+}
