@@ -47,7 +47,7 @@ fn same_bits<S: Engines>(scene: &str, size: (u32, u32)) {
     let view = View::new(&world, &description, &camera, size, 1).expect("a view");
     let workers = [1, 2].map(|threads| Workers::new(threads).expect("threads"));
     for kind in [RayKind::Primary, RayKind::Diffuse, RayKind::Scatter] {
-        let rays = view.rays(&world, kind);
+        let rays = view.rays(&world, kind).unwrap();
         for query in [Query::Closest, Query::Any] {
             let mut want: Option<(u64, u64)> = None;
             for tile in TILES {

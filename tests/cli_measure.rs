@@ -204,6 +204,14 @@ fn explain_counts_compares_and_draws() {
     assert!(nodes(0, 1) < nodes(0, 0) && nodes(1, 1) < nodes(1, 0), "packets share visits: {report}");
     assert_eq!(engines(0)[1]["packets"].as_u64(), Some(128 * 96 / 8));
     assert!(report["tree"]["leaves"].as_u64() > Some(0), "{report}");
+    for (work, lanes) in engines(0).iter().zip([1, 8]) {
+        let limit = |key: &str| work["limit"][key].as_f64().expect("a limit: the box is of triangles");
+        assert!((limit("percent") - 100.0 * limit("ns_per_ray") / limit("measured_ns_per_ray")).abs() < 1e-6);
+        assert!(limit("boxes") > 0.0 && work["bytes_per_ray"].as_f64() > Some(0.0), "{work}");
+        // A single ray has nobody to part from.
+        let parted = work["per_packet"]["divergence"]["max"].as_f64();
+        assert_eq!((work["together"].is_null(), parted > Some(0.0)), (lanes == 1, lanes > 1), "{work}");
+    }
     let drawn = files(&dir.path().join("why"));
     assert_eq!(drawn.len(), 8, "2 classes x 2 engines x (EXR, PNG): {drawn:?}");
     let film = lanecast::film::exr::read(&dir.path().join("why/cost-primary-scalar.exr")).expect("an EXR");
@@ -214,6 +222,10 @@ fn explain_counts_compares_and_draws() {
         text.contains("SAH cost") && text.contains("per packet") && text.contains("times as fast as scalar"),
         "{text}"
     );
+    assert!(text.contains("of the limit") && text.contains("rays part at depth"), "{text}");
+    // The limit is of triangles.
+    let flake = run(&dir, "explain builtin:sphere-flake --engine scalar --size 32x32 --json").json();
+    assert!(flake["classes"][0]["engines"][0]["limit"].is_null() && flake["costs"]["ns_box"].is_number(), "{flake}");
     binary::refused(dir.path(), &["explain", "square.ply", "--engine", "paket8"], "packet8");
 }
 

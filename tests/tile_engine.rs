@@ -67,17 +67,30 @@ fn differences(world: &Scene, rays: &Rays<f32>) -> (usize, usize) {
     let different = (0..rays.len()).filter(|&i| any_want[i] != any[i]).count();
     find("tile").intersect(world, rays, &mut got, &mut scratch, None);
     find("tile").occluded(world, rays, &mut any, &mut scratch, None);
-    explained(world, rays, &Answers::Closest(vec![want]), Answers::Closest(vec![got]));
-    explained(world, rays, &Answers::Any(vec![any_want]), Answers::Any(vec![any]));
+    let (want, any_want) = (Answers::Closest(vec![want]), Answers::Any(vec![any_want]));
+    explained(world, rays, &want, Answers::Closest(vec![got.clone()]));
+    explained(world, rays, &any_want, Answers::Any(vec![any.clone()]));
+    for small in ["tile-8x8", "tile-4x4"] {
+        find(small).intersect(world, rays, &mut got, &mut scratch, None);
+        find(small).occluded(world, rays, &mut any, &mut scratch, None);
+        admitted(world, rays, &want, &Answers::Closest(vec![got.clone()]));
+        admitted(world, rays, &any_want, &Answers::Any(vec![any.clone()]));
+    }
     (closest, different)
 }
 
-/// Lets the oracle judge where `own` is not `scalar` up to rounding, and a sample of the rest.
-fn explained(scene: &Scene, rays: &Rays<f32>, scalar: &Answers<f32>, own: Answers<f32>) {
-    let (batches, oracle) = (std::slice::from_ref(rays), &scene.oracle);
-    if let Err(why) = truth::admit(find("tile"), batches, scalar, &own, || Cow::Borrowed(oracle)) {
+/// Lets the oracle judge where `own` is not `scalar` up to rounding.
+fn admitted(scene: &Scene, rays: &Rays<f32>, scalar: &Answers<f32>, own: &Answers<f32>) {
+    let batches = std::slice::from_ref(rays);
+    if let Err(why) = truth::admit(find("tile"), batches, scalar, own, || Cow::Borrowed(&scene.oracle)) {
         panic!("{why}");
     }
+}
+
+/// The same, and a sample of the rest.
+fn explained(scene: &Scene, rays: &Rays<f32>, scalar: &Answers<f32>, own: Answers<f32>) {
+    admitted(scene, rays, scalar, &own);
+    let (batches, oracle) = (std::slice::from_ref(rays), &scene.oracle);
     let counts = truth::judge(oracle, truth::OWN_MARGIN_FACTOR, batches, &own, 199);
     assert_eq!(counts.unexplained, 0, "{:?}", counts.samples);
 }

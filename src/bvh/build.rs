@@ -2,7 +2,7 @@
 
 use super::binary;
 use super::collapse::Plan;
-use super::node::{Child, Node, WIDTH};
+use super::node::{Child, LEAF_PRIMS, Node, WIDTH};
 use crate::lanes::Real;
 use crate::math::Aabb;
 
@@ -16,6 +16,27 @@ pub enum Preset {
     Balanced,
     /// Slow build, fastest rays.
     Best,
+}
+
+/// How a tree is built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuildSettings {
+    /// Time it may take.
+    pub preset: Preset,
+    /// Most primitives in a leaf, 1 to [`LEAF_PRIMS`].
+    pub leaf: usize,
+}
+
+impl Default for BuildSettings {
+    fn default() -> Self {
+        Preset::default().into()
+    }
+}
+
+impl From<Preset> for BuildSettings {
+    fn from(preset: Preset) -> Self {
+        Self { preset, leaf: LEAF_PRIMS }
+    }
 }
 
 /// A flat tree over boxes. Nodes are in depth-first order, node 0 is the root; no nodes for no primitives.
@@ -36,7 +57,7 @@ pub struct Leaf {
     pub class: u8,
     /// Number of the block among the blocks of this class; leaves of a class come in ascending order.
     pub block: u32,
-    /// Primitives, ascending, at most eight.
+    /// Primitives, ascending, at most eight (or what [`BuildSettings::leaf`] says).
     pub prims: Vec<u32>,
 }
 
@@ -54,13 +75,14 @@ impl<S: Real> Tree<S> {
 
 /// Builds a tree over primitives with finite boxes `boxes` and leaf classes `classes` (below 255).
 /// Deterministic: the same input gives the same tree on any number of threads.
-pub fn build<S: Real>(boxes: &[Aabb<S>], classes: &[u8], preset: Preset) -> (Tree<S>, Vec<Leaf>) {
+pub fn build<S: Real>(boxes: &[Aabb<S>], classes: &[u8], settings: impl Into<BuildSettings>) -> (Tree<S>, Vec<Leaf>) {
     assert_eq!(boxes.len(), classes.len());
+    let BuildSettings { preset, leaf } = settings.into();
     let nodes = binary::build(boxes, preset);
     if nodes.is_empty() {
         return (Tree::empty(), Vec::new());
     }
-    let plan = Plan::new(&nodes, classes);
+    let plan = Plan::new(&nodes, classes, leaf);
     let mut emission =
         Emission { binary: &nodes, plan: &plan, nodes: Vec::new(), leaves: Vec::new(), blocks: [0; 256] };
     let depth = emission.run();

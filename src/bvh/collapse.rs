@@ -20,6 +20,8 @@ pub struct Plan {
     counts: Vec<u32>,
     /// Class of all primitives below, or [`MIXED`].
     classes: Vec<u8>,
+    /// Most primitives in a leaf.
+    most: u32,
 }
 
 /// Half the area of a box whose extents are scaled first.
@@ -33,12 +35,14 @@ fn relative_area<S: Real>(bounds: &Aabb<S>, scale: f64) -> f32 {
 const MIXED: u8 = u8::MAX;
 
 impl Plan {
-    /// Plans the collapse of `nodes`, whose leaves are primitives with the given classes.
-    pub fn new<S: Real>(nodes: &[Binary<S>], class_of: &[u8]) -> Self {
+    /// Plans the collapse of `nodes`, whose leaves are primitives with the given classes, to leaves of `most` primitives
+    /// (1 to [`LEAF_PRIMS`]).
+    pub fn new<S: Real>(nodes: &[Binary<S>], class_of: &[u8], most: usize) -> Self {
         let mut plan = Self {
             decisions: vec![[0; WIDTH]; nodes.len()],
             counts: vec![1; nodes.len()],
             classes: vec![MIXED; nodes.len()],
+            most: most.clamp(1, LEAF_PRIMS) as u32,
         };
         let mut costs = vec![[0f32; WIDTH]; nodes.len()];
         // Extents relative to the root's: areas of a scene of any size fit f32.
@@ -75,7 +79,7 @@ impl Plan {
                 }
             }
         }
-        let fits = self.counts[i] as usize <= LEAF_PRIMS && self.classes[i] != MIXED;
+        let fits = self.counts[i] <= self.most && self.classes[i] != MIXED;
         let (best_forest, on_left) = forests[WIDTH - 1];
         let as_node = area + best_forest;
         let leaf = fits && area <= as_node;

@@ -12,6 +12,6 @@ mod quality;
 #[cfg(test)]
 mod tests;
 
-pub use build::{Leaf, Preset, Tree, build};
+pub use build::{BuildSettings, Leaf, Preset, Tree, build};
 pub use node::{Child, LEAF_PRIMS, Node, WIDTH};
 pub use quality::Quality;

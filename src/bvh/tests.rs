@@ -46,6 +46,22 @@ fn every_preset_and_every_small_count() {
 }
 
 #[test]
+fn leaves_are_as_small_as_asked_for() {
+    let boxes = soup(3000, 21);
+    let classes = vec![0; boxes.len()];
+    let nodes: Vec<usize> = (1..=LEAF_PRIMS)
+        .map(|leaf| {
+            let settings = BuildSettings { leaf, ..Preset::Balanced.into() };
+            let (tree, leaves) = build(&boxes, &classes, settings);
+            tree.validate(&boxes, &classes, &leaves).unwrap();
+            assert_eq!(leaves.iter().map(|l| l.prims.len()).max(), Some(leaf), "at most {leaf}, and some are full");
+            tree.nodes.len()
+        })
+        .collect();
+    assert!(nodes.windows(2).all(|n| n[0] >= n[1]) && nodes[0] > 2 * nodes[7], "{nodes:?}");
+}
+
+#[test]
 fn awkward_boxes_stay_shallow() {
     let unit = Aabb { lo: [0.0f32; 3], hi: [1.0; 3] };
     let same = vec![unit; 5000];

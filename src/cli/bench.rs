@@ -231,7 +231,7 @@ fn one<S: Engines>(
         size,
         repeat: args.repeat,
         seed: args.seed,
-        preset: args.options.preset(),
+        build: args.options.build(),
         peers: args.invitation(),
     };
     let camera = |bounds| args.camera.choose(description, bounds, size);

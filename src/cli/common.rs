@@ -5,7 +5,7 @@ use crate::measure::timing::MAX_THREADS;
 use crate::scene::brlcad::describe::Options;
 use crate::scene::description::{Description, Precision};
 use crate::scene::load::{LoadOptions, ReadMesh, load_with, read_mesh};
-use crate::scene::world::Preset;
+use crate::scene::world::{BuildSettings, Preset};
 use crate::trace::{EXACT_ENGINE, Engine, Engines, engine as engine_called};
 
 pub use super::interrupt::stop_flag;
@@ -80,6 +80,9 @@ pub struct SceneOptions {
     /// Time the build may take: how good the tree gets
     #[arg(long, value_enum, default_value_t = PresetArg::Balanced, help_heading = "Scene")]
     pub preset: PresetArg,
+    /// Most primitives in a leaf of the tree, 1 to 8
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..=8), help_heading = "Scene")]
+    pub leaf: u8,
     /// Arithmetic of the engines [default: what the scene asks for, else f32]
     #[arg(long, value_enum, help_heading = "Scene")]
     pub precision: Option<PrecisionArg>,
@@ -142,13 +145,14 @@ impl SceneOptions {
         asked.or(description.precision).unwrap_or(Precision::F32)
     }
 
-    /// The tree quality asked for.
-    pub fn preset(&self) -> Preset {
-        match self.preset {
+    /// The trees asked for.
+    pub fn build(&self) -> BuildSettings {
+        let preset = match self.preset {
             PresetArg::Fast => Preset::Fast,
             PresetArg::Balanced => Preset::Balanced,
             PresetArg::Best => Preset::Best,
-        }
+        };
+        BuildSettings { preset, leaf: usize::from(self.leaf) }
     }
 }
 

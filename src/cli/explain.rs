@@ -12,7 +12,7 @@ use crate::film::exr::{Compression, ImageInfo};
 use crate::film::{Film, PlaneData, Window, exr, heat};
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
-use crate::measure::explain::{Maps, Quality, Work, quality, work};
+use crate::measure::explain::{Costs, Maps, Quality, Work, costs, quality, work};
 use crate::measure::eye::View;
 use crate::measure::raysets::{RayKind, convert};
 use crate::measure::timing::Workers;
@@ -34,7 +34,9 @@ Examples:
 
 Every engine is counted packet by packet: node visits, box and primitive tests, lanes in use, bytes looked at; the
 times of the 32x32 pixel tiles are fitted to these counts, which says where the time goes. Of the tree: SAH cost,
-end-point overlap, sizes and depths of leaves. With -o, what each pixel cost: cost-CLASS-ENGINE.exr and .png.
+end-point overlap, sizes and depths of leaves; of the rays: the depth at which those of a packet part. For scenes of
+triangles, the limit: how long the machine's lanes take for the counted tests alone, by single tests measured in the same
+run (docs/METHODOLOGY.md says what that is and is not). With -o, what each pixel cost: cost-CLASS-ENGINE.exr and .png.
 Engines are not checked here (verify does that); figures of speed are of one thread and only to go with the counts.";
 
 /// Arguments of `lanecast explain`.
@@ -71,6 +73,7 @@ struct Report<'a> {
     isa: &'static str,
     size: (u32, u32),
     tree: Option<Quality>,
+    costs: Costs,
     classes: Vec<Class>,
 }
 
@@ -99,7 +102,7 @@ fn explain<S: Engines>(args: &ExplainArgs, description: &Description) -> Result<
     let engines = names.iter().map(|name| engine::<S>(name)).collect::<Result<Vec<_>>>()?;
     let size = args.camera.size.unwrap_or(DEFAULT_SIZE);
     let workers = Workers::new(args.threads.count())?;
-    let world = workers.install(|| World::<S>::compile(description, args.scene.options.preset()))?;
+    let world = workers.install(|| World::<S>::compile(description, args.scene.options.build()))?;
     let camera = |bounds| args.camera.choose(description, bounds, size);
     let view = workers.install(|| View::new(&world, description, &camera, size, args.seed))?;
     let bar = args.output.progress_bar((args.rays.len() * engines.len()) as u64, "counting");
@@ -109,16 +112,19 @@ fn explain<S: Engines>(args: &ExplainArgs, description: &Description) -> Result<
         isa: compiled_isa(),
         size,
         tree: workers.install(|| quality(&world)),
+        costs: workers.install(costs::<S>),
         classes: Vec::new(),
     };
     for &kind in &args.rays {
-        let batches = convert::<S>(&workers.install(|| view.rays(&world, kind)));
+        let batches = convert::<S>(&workers.install(|| view.rays(&world, kind))?);
         let mut class = Class { rays: kind.name(), query: kind.query().name(), engines: Vec::new() };
         for &engine in &engines {
             if stopped() {
                 return Err(Error::Interrupted);
             }
-            class.engines.push(workers.install(|| work(engine, &world, &batches, kind, size, &stopped))?);
+            class
+                .engines
+                .push(workers.install(|| work(engine, &world, &batches, kind, size, &report.costs, &stopped))?);
             bar.inc(1);
         }
         report.classes.push(class);

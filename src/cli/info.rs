@@ -97,7 +97,7 @@ pub fn run(args: &InfoArgs) -> Result<()> {
 }
 
 fn info<S: Engines>(args: &InfoArgs, description: &Description) -> Result<()> {
-    let world = World::<S>::compile(description, args.scene.options.preset())?;
+    let world = World::<S>::compile(description, args.scene.options.build())?;
     let report = report(&args.scene.scene, description, &world);
     if args.output.json {
         return json_to_stdout(&report);

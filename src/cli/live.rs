@@ -134,7 +134,7 @@ where
     World<S>: Send + Sync,
 {
     let before = before.and_then(|before| before.as_any().downcast_ref::<World<S>>());
-    let world = World::<S>::compile_after(&description, options.preset(), before)?;
+    let world = World::<S>::compile_after(&description, options.build(), before)?;
     Ok(Some(Arc::new(Scene { description, world })))
 }
 

@@ -35,7 +35,7 @@ The order is that of 32x32 pixel tiles, Morton order inside. Where a primary ray
 pub struct RaysArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Ray class: primary, shadow, ao, reflect, diffuse or scatter
+    /// Ray class: primary, shadow, ao, reflect, diffuse, diffuse2, diffuse3 or scatter
     #[arg(long)]
     kind: RayKind,
     #[command(flatten)]
@@ -96,8 +96,8 @@ pub fn run(args: &RaysArgs) -> Result<()> {
 }
 
 fn rays<S: Engines>(args: &RaysArgs, description: &Description, size: (u32, u32)) -> Result<Vec<Rays<f32>>> {
-    let world = World::<S>::compile(description, args.scene.options.preset())?;
+    let world = World::<S>::compile(description, args.scene.options.build())?;
     let camera = |bounds| args.camera.choose(description, bounds, size);
     let view = View::new(&world, description, &camera, size, args.seed)?;
-    Ok(view.rays(&world, args.kind))
+    view.rays(&world, args.kind)
 }

@@ -208,7 +208,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 
 fn compiled<S: Engines>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
     args.engine.find::<S>()?;
-    let world = World::<S>::compile(description, args.scene.options.preset())?;
+    let world = World::<S>::compile(description, args.scene.options.build())?;
     picture(args, description, options, &world, true)
 }
 

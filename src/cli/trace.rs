@@ -172,7 +172,7 @@ pub fn run(args: &TraceArgs) -> Result<()> {
 fn trace<S: Engines>(args: &TraceArgs, query: Query, description: &Description, rays: &Rays<f32>) -> Result<()> {
     let engine = args.engine.find::<S>()?;
     let workers = Workers::new(args.threads.count())?;
-    let world = workers.install(|| World::<S>::compile(description, args.scene.options.preset()))?;
+    let world = workers.install(|| World::<S>::compile(description, args.scene.options.build()))?;
     let batches = split::<S>(rays);
     let answers = checked(&workers, engine, &world, &batches, query)?;
 

@@ -99,7 +99,7 @@ fn one<S: Engines>(
         size: args.camera.size,
         kinds: args.kinds.clone(),
         seed: args.seed,
-        preset: args.scene.options.preset(),
+        build: args.scene.options.build(),
     };
     let size = args.camera.size.unwrap_or((4, 3));
     let camera = |bounds| args.camera.choose(description, bounds, size);

@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use crate::error::{Error, Result};
 use crate::measure::agreement::{Agreement, compare};
 use crate::measure::answers::Answers;
+use crate::measure::explain::{self, Costs, Limit};
 use crate::measure::eye::{Framing, View};
 use crate::measure::peers::{Guest, Invitation, Peer};
 use crate::measure::raysets::{RayKind, convert};
@@ -15,7 +16,7 @@ use crate::measure::truth;
 use crate::ray::{Counters, Rays};
 use crate::reference::{MARGIN_FACTOR, Oracle};
 use crate::scene::description::Description;
-use crate::scene::world::{Preset, World};
+use crate::scene::world::{BuildSettings, World};
 use crate::trace::{Engine, Engines, engine};
 
 /// Rounds that are run and thrown away before the timed ones: caches, page tables and clocks settle.
@@ -45,7 +46,7 @@ pub struct Plan {
     /// Seed of the random directions.
     pub seed: u64,
     /// Tree quality.
-    pub preset: Preset,
+    pub build: BuildSettings,
     /// Other tracers to run beside them.
     pub peers: Invitation,
 }
@@ -68,7 +69,7 @@ pub fn scene<S: Engines>(
 ) -> Result<()> {
     let engines = chosen::<S>(&plan.engines)?;
     plan.peers.check()?;
-    let world = workers.install(|| World::<S>::compile(description, plan.preset))?;
+    let world = workers.install(|| World::<S>::compile(description, plan.build))?;
     let view = workers.install(|| View::new(&world, description, camera, plan.size, plan.seed))?;
     let oracle = Oracle::new(&world.assembly);
     let stats = world.stats();
@@ -80,9 +81,10 @@ pub fn scene<S: Engines>(
         bytes: stats.node_bytes + stats.prim_bytes,
     };
     let guests = plan.peers.open::<S>(&world.assembly, workers)?;
-    let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests };
+    let costs = explain::is_of_triangles(&world).then(|| workers.install(explain::costs::<S>));
+    let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests, costs };
     for &kind in &plan.kinds {
-        let rays = workers.install(|| view.rays(&world, kind));
+        let rays = workers.install(|| view.rays(&world, kind))?;
         subject.class(kind, &convert(&rays), plan.repeat, stop, report)?;
     }
     Ok(())
@@ -100,6 +102,8 @@ struct Subject<'a, S: 'static> {
     facts: SceneFacts,
     engines: Vec<&'static dyn Engine<S>>,
     guests: Vec<Guest<S>>,
+    /// Of single tests, if the scene is of triangles.
+    costs: Option<Costs>,
 }
 
 /// Answers that may be timed and, for a peer, how they compare with ours.
@@ -273,6 +277,9 @@ impl<S: Engines> Subject<'_, S> {
             Tracer::Peer(_) => Counters::default(),
         };
         let lane_use = |active: u64, total: u64| (total > 0).then(|| active as f64 / total as f64);
+        // Every thread has the time of the pass.
+        let of_limit = |costs: &Costs| Limit::of(costs, &counters, seconds.median * self.workers.threads() as f64);
+        let percent_of_limit = self.costs.as_ref().and_then(of_limit).map(|limit| limit.percent);
         Some(Outcome::Timed {
             seconds,
             repeat: one.seconds.len(),
@@ -282,6 +289,7 @@ impl<S: Engines> Subject<'_, S> {
             ratio: baseline.and_then(|b| paired_ratio_median(b, &one.seconds)),
             node_lane_use: lane_use(counters.node_lanes_active, counters.node_lanes_total),
             prim_lane_use: lane_use(counters.prim_lanes_active, counters.prim_lanes_total),
+            percent_of_limit,
         })
     }
 }

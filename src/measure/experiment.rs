@@ -20,7 +20,7 @@ const MAX_BYTES: usize = 1 << 20;
 /// Most values in one statement.
 const MAX_VALUES: usize = 100;
 
-const STATEMENTS: [&str; 12] = [
+const STATEMENTS: [&str; 13] = [
     "question",
     "scenes",
     "vary",
@@ -32,6 +32,7 @@ const STATEMENTS: [&str; 12] = [
     "repeat",
     "seed",
     "preset",
+    "leaf",
     "precision",
 ];
 
@@ -69,6 +70,8 @@ pub struct Case {
     pub seed: u64,
     /// `fast`, `balanced` or `best`.
     pub preset: String,
+    /// Most primitives in a leaf; `None` for the builder's own.
+    pub leaf: Option<u8>,
     /// `f32`, `f64`, or empty for the scene's own.
     pub precision: String,
 }
@@ -85,6 +88,7 @@ impl Case {
         let (width, height) = self.size;
         words.push(format!("--size {width}x{height} --threads {} --repeat {}", self.threads, self.repeat));
         words.push(format!("--seed {} --preset {}", self.seed, self.preset));
+        words.extend(self.leaf.map(|leaf| format!("--leaf {leaf}")));
         words.extend((!self.precision.is_empty()).then(|| format!("--precision {}", self.precision)));
         words.join(" ")
     }
@@ -96,7 +100,8 @@ impl Case {
         let set = self.set.iter().map(|(name, value)| format!("-{name}-{value}")).collect::<String>();
         let (width, height) = self.size;
         let precision = if self.precision.is_empty() { String::new() } else { format!("-{}", self.precision) };
-        let label = format!("{stem}{set}-{width}x{height}-t{}-{}{precision}", self.threads, self.preset);
+        let leaf = self.leaf.map_or(String::new(), |leaf| format!("-leaf-{leaf}"));
+        let label = format!("{stem}{set}-{width}x{height}-t{}-{}{leaf}{precision}", self.threads, self.preset);
         label.chars().map(|c| if c.is_ascii_alphanumeric() || "-.".contains(c) { c } else { '-' }).collect()
     }
 }
@@ -157,13 +162,15 @@ impl Reader<'_, '_> {
         let repeat = self.each("repeat", "10", number)?[0];
         let seed = self.each("seed", "1", |text| text.parse().map_err(|_| "expected a whole number".to_string()))?[0];
         let presets = self.each("preset", "balanced", |text| one_of(text, &["fast", "balanced", "best"]))?;
+        let leaves = if self.find("leaf").is_none() { vec![None] } else { self.each("leaf", "8", leaf)? };
         let precisions = if self.find("precision").is_none() {
             vec![String::new()]
         } else {
             self.each("precision", "f32", |text| one_of(text, &["f32", "f64"]))?
         };
         let variations = self.variations()?;
-        let lists = [variations.len(), scenes.len(), sizes.len(), threads.len(), presets.len(), precisions.len()];
+        let trees: Vec<_> = presets.iter().flat_map(|preset| leaves.iter().map(move |leaf| (preset, *leaf))).collect();
+        let lists = [variations.len(), scenes.len(), sizes.len(), threads.len(), trees.len(), precisions.len()];
         let count = lists.iter().try_fold(1usize, |product, &list| product.checked_mul(list));
         if count.is_none_or(|count| count > MAX_CASES) {
             return Err(self.source.error(self.node.span, format!("expected at most {MAX_CASES} cases")));
@@ -172,10 +179,23 @@ impl Reader<'_, '_> {
         for set in variations {
             for scene in &scenes {
                 for (&size, &threads) in sizes.iter().flat_map(|size| threads.iter().map(move |t| (size, t))) {
-                    for (preset, precision) in presets.iter().flat_map(|p| precisions.iter().map(move |q| (p, q))) {
-                        let (scene, preset, precision) = (scene.clone(), preset.clone(), precision.clone());
+                    for (tree, precision) in trees.iter().flat_map(|t| precisions.iter().map(move |p| (t, p))) {
+                        let (scene, preset, leaf, precision) =
+                            (scene.clone(), tree.0.clone(), tree.1, precision.clone());
                         let (engines, peers, set) = (engines.clone(), peers.clone(), set.clone());
-                        cases.push(Case { scene, set, engines, peers, size, threads, repeat, seed, preset, precision });
+                        cases.push(Case {
+                            scene,
+                            set,
+                            engines,
+                            peers,
+                            size,
+                            threads,
+                            repeat,
+                            seed,
+                            preset,
+                            leaf,
+                            precision,
+                        });
                     }
                 }
             }
@@ -242,6 +262,11 @@ impl Reader<'_, '_> {
             _ => Err(self.source.error(entry.span, "expected a word or a number")),
         }
     }
+}
+
+fn leaf(text: &str) -> std::result::Result<Option<u8>, String> {
+    let leaf = text.parse().ok().filter(|leaf| (1..=8).contains(leaf));
+    leaf.map(Some).ok_or_else(|| "expected a number of primitives from 1 to 8".into())
 }
 
 fn size(text: &str) -> std::result::Result<(u32, u32), String> {

@@ -55,15 +55,17 @@ impl View {
     }
 
     /// The rays of class `kind` in `world`, on the current rayon pool: a tile per batch, or as many scattered rays
-    /// as the picture has pixels.
-    pub fn rays<S: Real>(&self, world: &World<S>, kind: RayKind) -> Vec<Rays<f32>> {
-        match kind {
-            RayKind::Primary => self.primary.clone(),
-            RayKind::Scatter => scatter(&world.assembly, self.pixels, self.setting.seed),
-            RayKind::Shadow | RayKind::Ao | RayKind::Reflect | RayKind::Diffuse => {
-                self.starts.rays(kind, &self.setting)
+    /// as the picture has pixels. Hits on the way are those of the `scalar` engine.
+    pub fn rays<S: Engines>(&self, world: &World<S>, kind: RayKind) -> Result<Vec<Rays<f32>>> {
+        Ok(match (kind, kind.parent()) {
+            (RayKind::Scatter, _) => scatter(&world.assembly, self.pixels, self.setting.seed),
+            (_, None) => self.primary.clone(),
+            (_, Some(RayKind::Primary)) => self.starts.rays(kind, &self.setting),
+            (_, Some(bounce)) => {
+                let before = self.rays(world, bounce)?;
+                Starts::trace(world, engine::<S>("scalar")?, &before).rays(kind, &self.setting)
             }
-        }
+        })
     }
 }
 

@@ -3,7 +3,8 @@
 //! Every set keeps the order of the ray file (see `camera`): 32x32 pixel tiles row by row, Morton order inside, one
 //! batch of [`BATCH`] rays per tile. Rays are made in f32 whatever the engines compute in, so that f32 and f64
 //! engines (and other programs, through a ray file) see the same numbers. Where a primary ray misses, the secondary
-//! ray is dead. One class needs no camera: [`scatter`] aims at the scene's own primitives.
+//! ray is dead; rays of a further bounce start where those of the bounce before hit. One class needs no camera:
+//! [`scatter`] aims at the scene's own primitives.
 
 mod scatter;
 
@@ -79,11 +80,24 @@ pub enum RayKind {
     Diffuse,
     /// Aimed at random primitives from all sides and distances, whatever their scale (see [`scatter`]).
     Scatter,
+    /// As [`RayKind::Diffuse`], from the hits of diffuse rays: the second bounce.
+    Diffuse2,
+    /// From the hits of these: the third bounce.
+    Diffuse3,
 }
 
 impl RayKind {
     /// All classes, in the order of tables.
-    pub const ALL: [Self; 6] = [Self::Primary, Self::Shadow, Self::Ao, Self::Reflect, Self::Diffuse, Self::Scatter];
+    pub const ALL: [Self; 8] = [
+        Self::Primary,
+        Self::Shadow,
+        Self::Ao,
+        Self::Reflect,
+        Self::Diffuse,
+        Self::Diffuse2,
+        Self::Diffuse3,
+        Self::Scatter,
+    ];
 
     /// Name on the command line and in tables.
     pub fn name(self) -> &'static str {
@@ -93,6 +107,8 @@ impl RayKind {
             Self::Ao => "ao",
             Self::Reflect => "reflect",
             Self::Diffuse => "diffuse",
+            Self::Diffuse2 => "diffuse2",
+            Self::Diffuse3 => "diffuse3",
             Self::Scatter => "scatter",
         }
     }
@@ -100,8 +116,18 @@ impl RayKind {
     /// What a renderer asks of these rays, so what a bench times.
     pub fn query(self) -> Query {
         match self {
-            Self::Primary | Self::Reflect | Self::Diffuse | Self::Scatter => Query::Closest,
             Self::Shadow | Self::Ao => Query::Any,
+            _ => Query::Closest,
+        }
+    }
+
+    /// The class whose hits these rays start from; `None` if they start from none.
+    pub fn parent(self) -> Option<Self> {
+        match self {
+            Self::Primary | Self::Scatter => None,
+            Self::Shadow | Self::Ao | Self::Reflect | Self::Diffuse => Some(Self::Primary),
+            Self::Diffuse2 => Some(Self::Diffuse),
+            Self::Diffuse3 => Some(Self::Diffuse2),
         }
     }
 }
@@ -138,26 +164,26 @@ fn convert_range<S: Real>(from: &Rays<f32>, range: std::ops::Range<usize>) -> Ra
     to
 }
 
-/// A primary hit: where secondary rays start.
+/// A hit where further rays start.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
     /// Hit point, world space.
     pub position: DVec3,
     /// Unit geometric normal on the side the ray came from.
     pub normal: DVec3,
-    /// Direction of the primary ray, not unit.
+    /// Direction of the ray that hit, not unit.
     pub dir: DVec3,
 }
 
-/// The primary hits of a camera, per batch and slot; `None` where the ray misses or is dead.
+/// Hits of some rays (a camera's, or those of a bounce), per batch and slot; `None` where the ray misses or is dead.
 #[derive(Debug)]
 pub struct Starts {
     batches: Vec<Vec<Option<Start>>>,
 }
 
 impl Starts {
-    /// Traces `primary` with `engine` on the current rayon pool.
-    pub fn trace<S: Real>(world: &World<S>, engine: &dyn Engine<S>, primary: &[Rays<f32>]) -> Self {
+    /// Traces `rays` with `engine` on the current rayon pool.
+    pub fn trace<S: Real>(world: &World<S>, engine: &dyn Engine<S>, rays: &[Rays<f32>]) -> Self {
         let scratches: Mutex<Vec<Scratch>> = Mutex::default();
         let batch_starts = |batch: &Rays<f32>| {
             let rays = convert_range(batch, 0..batch.len());
@@ -169,10 +195,10 @@ impl Starts {
             }
             (0..rays.len()).map(|i| start(world, &rays, &hits, i)).collect()
         };
-        Self { batches: primary.par_iter().map(batch_starts).collect() }
+        Self { batches: rays.par_iter().map(batch_starts).collect() }
     }
 
-    /// Number of primary hits.
+    /// Number of hits.
     pub fn count(&self) -> usize {
         self.batches.iter().flatten().flatten().count()
     }
@@ -248,7 +274,7 @@ fn secondary(kind: RayKind, at: &Start, setting: &Setting, random: [f64; 2]) -> 
         }
         RayKind::Ao => (cosine(), (AO_REACH * setting.diagonal) as f32),
         RayKind::Reflect => (reflect(at.dir, at.normal).normalize_or_zero(), f32::INFINITY),
-        RayKind::Diffuse => (cosine(), f32::INFINITY),
+        RayKind::Diffuse | RayKind::Diffuse2 | RayKind::Diffuse3 => (cosine(), f32::INFINITY),
     };
     finite(offset_origin(at.position, at.normal), dir, t_max)
 }

@@ -74,6 +74,8 @@ pub enum Outcome {
         node_lane_use: Option<f64>,
         /// The same over primitive tests.
         prim_lane_use: Option<f64>,
+        /// Time of the counted tests alone over the median pass, see [`crate::measure::explain::Limit`]; scenes of triangles.
+        percent_of_limit: Option<f64>,
     },
     /// Not run, with the reason.
     Skipped(String),
@@ -128,7 +130,7 @@ impl Row {
 
 const COLUMNS: &str = "revision,date,cpu,isa,flags,threads,scene,scene_hash,prims,class,query,engine,precision,rays,\
     status,hits,repeat,best_mrays_per_s,median_mrays_per_s,spread,mad_seconds,ratio_to_scalar,node_lane_use,\
-    prim_lane_use,checksum,build_seconds,bytes,peer_mode,peer_description,quoted,ties,differences,ours_over_peer,\
+    prim_lane_use,percent_of_limit,checksum,build_seconds,bytes,peer_mode,peer_description,quoted,ties,differences,ours_over_peer,\
     command,seconds";
 
 /// The file: a header line and one line per row, RFC 4180 quoting, lines end in LF.
@@ -149,11 +151,21 @@ fn line(run: &Run, row: &Row) -> String {
     cells.push(row.rays.to_string());
     let optional = |x: &Option<f64>| x.map_or(String::new(), |x| format!("{x:.4}"));
     match &row.outcome {
-        Outcome::Timed { seconds, repeat, hits, checksum, ratio, node_lane_use, prim_lane_use, .. } => {
+        Outcome::Timed {
+            seconds,
+            repeat,
+            hits,
+            checksum,
+            ratio,
+            node_lane_use,
+            prim_lane_use,
+            percent_of_limit,
+            ..
+        } => {
             cells.extend(["ok".into(), hits.to_string(), repeat.to_string()]);
             cells.extend([seconds.min, seconds.median].map(|s| format!("{:.4}", row.mrays(s))));
             cells.extend([format!("{:.4}", seconds.spread), format!("{:.9}", seconds.mad)]);
-            cells.extend([ratio, node_lane_use, prim_lane_use].map(optional));
+            cells.extend([ratio, node_lane_use, prim_lane_use, percent_of_limit].map(optional));
             cells.push(format!("{checksum:016x}"));
         }
         Outcome::Skipped(why) => cells.extend(without_figures(format!("skipped: {why}"))),
@@ -174,8 +186,8 @@ fn line(run: &Run, row: &Row) -> String {
     cells.iter().map(|c| quoted(c)).collect::<Vec<_>>().join(",")
 }
 
-fn without_figures(status: String) -> [String; 11] {
-    let mut cells: [String; 11] = Default::default();
+fn without_figures(status: String) -> [String; 12] {
+    let mut cells: [String; 12] = Default::default();
     cells[0] = status;
     cells
 }
@@ -296,6 +308,7 @@ mod tests {
             ratio: Some(2.0),
             node_lane_use: Some(0.5),
             prim_lane_use: None,
+            percent_of_limit: Some(12.5),
         })
     }
 
@@ -339,6 +352,7 @@ mod tests {
         assert_eq!(cell(1, "median_mrays_per_s"), "2.0000");
         assert_eq!(cell(1, "spread"), "0.5000");
         assert_eq!(cell(1, "ratio_to_scalar"), "2.0000");
+        assert_eq!(cell(1, "percent_of_limit"), "12.5000");
         assert_eq!(cell(1, "checksum"), "0000000000000abc");
         assert_eq!(cell(1, "seconds"), "1.000000000 0.500000000 1.000000000");
         assert_eq!(cell(2, "status"), "skipped: too, many");

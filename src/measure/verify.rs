@@ -10,7 +10,7 @@ use crate::measure::truth::{self, Counts};
 use crate::ray::Rays;
 use crate::reference::{MARGIN_FACTOR, Oracle};
 use crate::scene::description::Description;
-use crate::scene::world::{Preset, World};
+use crate::scene::world::{BuildSettings, World};
 use crate::trace::{Engine, Engines, engine};
 
 /// Largest number of ray-primitive tests an engine or oracle without a tree may take on in one pass (about a
@@ -29,7 +29,7 @@ pub struct Options {
     /// Seed of the random directions.
     pub seed: u64,
     /// Tree quality.
-    pub preset: Preset,
+    pub build: BuildSettings,
 }
 
 /// One engine on one ray class.
@@ -91,14 +91,14 @@ pub fn verify<S: Engines>(
     stop: &dyn Fn() -> bool,
     report: &mut dyn FnMut(Line),
 ) -> Result<()> {
-    let world = workers.install(|| World::<S>::compile(description, options.preset))?;
+    let world = workers.install(|| World::<S>::compile(description, options.build))?;
     let rays = options.rays.unwrap_or_else(|| default_rays(world.assembly.instanced_prims()));
     let size = options.size.unwrap_or_else(|| picture_of(rays));
     let view = workers.install(|| View::new(&world, description, camera, size, options.seed))?;
     let oracle = Oracle::new(&world.assembly);
     let bench = Bench { workers, world: &world, oracle: &oracle };
     for &kind in &options.kinds {
-        let rays = workers.install(|| view.rays(&world, kind));
+        let rays = workers.install(|| view.rays(&world, kind))?;
         let batches = convert::<S>(&rays);
         for query in [Query::Closest, Query::Any] {
             bench.query(kind, query, &batches, stop, report)?;

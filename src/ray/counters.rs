@@ -10,6 +10,9 @@ pub struct Counters {
     pub nodes: u64,
     /// Tests of one box against all lanes of a packet, after the packet's bounds met it.
     pub boxes: u64,
+    /// Tests of a box against one ray, or against the bounds of several: eight per node visit of a packet or tile, eight per
+    /// ray and node visit of a stream, and one per lane where a box is tested against all lanes.
+    pub box_lanes: u64,
     /// Leaves visited.
     pub leaves: u64,
     /// Primitive tests (one primitive against one packet).
@@ -22,6 +25,8 @@ pub struct Counters {
     pub prim_lanes_active: u64,
     /// Lanes paid for in primitive tests.
     pub prim_lanes_total: u64,
+    /// Of these, lanes tested by the linear functions of a tile.
+    pub prim_lanes_linear: u64,
     /// Trees of solids tested (one tree against one packet).
     pub solids: u64,
     /// Leaves of trees of solids whose boxes the packets met.
@@ -39,12 +44,14 @@ impl std::ops::AddAssign for Counters {
         self.rays += o.rays;
         self.nodes += o.nodes;
         self.boxes += o.boxes;
+        self.box_lanes += o.box_lanes;
         self.leaves += o.leaves;
         self.prims += o.prims;
         self.node_lanes_active += o.node_lanes_active;
         self.node_lanes_total += o.node_lanes_total;
         self.prim_lanes_active += o.prim_lanes_active;
         self.prim_lanes_total += o.prim_lanes_total;
+        self.prim_lanes_linear += o.prim_lanes_linear;
         self.solids += o.solids;
         self.solid_leaves_met += o.solid_leaves_met;
         self.solid_leaves_kept += o.solid_leaves_kept;

@@ -84,6 +84,10 @@ pub trait Engines: Real {
     const PRECISION: &'static str;
     /// All engines of this precision, baselines first.
     fn engines() -> &'static [&'static dyn Engine<Self>];
+    /// Variants that answer one question of an experiment and are taken up only by name.
+    fn variants() -> &'static [&'static dyn Engine<Self>] {
+        &[]
+    }
     #[doc(hidden)]
     fn memory(scratch: &mut Scratch) -> &mut Memory<Self>;
 }
@@ -102,6 +106,10 @@ impl Engines for f32 {
             &tile::Tile::<true>,
             &tile::Tile::<false>,
         ]
+    }
+
+    fn variants() -> &'static [&'static dyn Engine<Self>] {
+        &[&tile::SmallTile(1), &tile::SmallTile(4)]
     }
 
     fn memory(scratch: &mut Scratch) -> &mut Memory<Self> {
@@ -133,17 +141,17 @@ impl Engines for f64 {
 pub const EXACT_ENGINE: &str = "auto-exact";
 
 /// The engine called `name`; `auto` is the fastest one of the precision on coherent rays (the last of the list, which
-/// hands what does not suit it to the packets), [`EXACT_ENGINE`] the fastest exact one.
+/// hands what does not suit it to the packets), [`EXACT_ENGINE`] the fastest exact one; also [`Engines::variants`].
 ///
 /// # Errors
 /// A usage error that lists the names and the nearest one.
 pub fn engine<S: Engines>(name: &str) -> Result<&'static dyn Engine<S>> {
-    let names = || S::engines().iter().map(|e| e.name()).chain(["auto", EXACT_ENGINE]);
+    let names = || S::engines().iter().chain(S::variants()).map(|e| e.name()).chain(["auto", EXACT_ENGINE]);
     let engines = || S::engines().iter().copied();
     let found = match name {
         "auto" => engines().next_back(),
         EXACT_ENGINE => engines().rfind(|e| e.is_exact()),
-        _ => engines().find(|e| e.name() == name),
+        _ => engines().chain(S::variants().iter().copied()).find(|e| e.name() == name),
     };
     found.ok_or_else(|| {
         let near = nearest_name(name, names()).map_or(String::new(), |n| format!("; did you mean `{n}`?"));

@@ -1,7 +1,7 @@
 //! One packet's query on its way through the trees: best hits, finished lanes, the stack.
 
 use super::single::Waiting;
-use crate::bvh::Child;
+use crate::bvh::{Child, WIDTH};
 use crate::csg;
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::{Candidate, Counters, HitPacket};
@@ -121,6 +121,7 @@ impl<'a, V: Lanes, const ANY: bool, const COUNT: bool> Query<'a, V, ANY, COUNT> 
     pub fn count_node(&mut self, lanes: u32) {
         if COUNT {
             self.counters.nodes += 1;
+            self.counters.box_lanes += WIDTH as u64;
             self.counters.node_lanes_active += u64::from(lanes.count_ones());
             self.counters.node_lanes_total += V::N as u64;
         }
@@ -131,6 +132,7 @@ impl<'a, V: Lanes, const ANY: bool, const COUNT: bool> Query<'a, V, ANY, COUNT> 
     pub fn count_box(&mut self) {
         if COUNT {
             self.counters.boxes += 1;
+            self.counters.box_lanes += V::N as u64;
         }
     }
 

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::{write, write_whole};
+use crate::bvh::LEAF_PRIMS;
 use crate::camera::framing;
 use crate::cli::interrupt::stopped;
 use crate::cli::output::OutputArgs;
@@ -17,7 +18,7 @@ use crate::measure::rows::{Outcome, Row, Run};
 use crate::measure::timing::Workers;
 use crate::scene::description::{CameraDescription, Description, Precision};
 use crate::scene::load::{LoadOptions, load};
-use crate::scene::world::Preset;
+use crate::scene::world::{BuildSettings, Preset};
 use crate::trace::Engines;
 
 /// Runs the experiment in `file` into `folder` (default: one called after it); returns the folder.
@@ -116,17 +117,18 @@ fn measure(
     let scene = if beside.is_file() { beside.to_string_lossy().into_owned() } else { case.scene.clone() };
     let description = load(&scene, &LoadOptions { set: case.set.clone(), ..Default::default() })?;
     let workers = Workers::new(case.threads as usize)?.flushing(!case.peers.is_empty());
+    let preset = match case.preset.as_str() {
+        "fast" => Preset::Fast,
+        "best" => Preset::Best,
+        _ => Preset::Balanced,
+    };
     let plan = Plan {
         kinds: kinds.to_vec(),
         engines: case.engines.clone(),
         size: case.size,
         repeat: case.repeat,
         seed: case.seed,
-        preset: match case.preset.as_str() {
-            "fast" => Preset::Fast,
-            "best" => Preset::Best,
-            _ => Preset::Balanced,
-        },
+        build: BuildSettings { leaf: case.leaf.map_or(LEAF_PRIMS, usize::from), ..preset.into() },
         peers: Invitation { names: case.peers.clone(), embree: embree.map(Path::to_path_buf) },
     };
     let f64_asked = match case.precision.as_str() {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Class, Report};
-use crate::measure::explain::{Quality, Spread, Work};
+use crate::measure::explain::{Costs, Limit, Quality, Spread, Work};
 
 /// Everything.
 pub fn table(report: &Report<'_>) -> String {
@@ -12,6 +12,12 @@ pub fn table(report: &Report<'_>) -> String {
     if let Some(tree) = &report.tree {
         text.push_str(&quality(tree));
     }
+    let Costs { lanes, ns_box, ns_triangle, ns_linear } = report.costs;
+    let _infallible = writeln!(
+        text,
+        "single tests  per lane, in vectors of {lanes} over data in the first cache: box {ns_box:.3} ns, triangle (missed) \
+         {ns_triangle:.3} ns, triangle in a tile {ns_linear:.3} ns"
+    );
     for class in &report.classes {
         let _infallible = write!(text, "\n{} rays, {}-hit\n", class.rays, class.query);
         class.engines.iter().for_each(|work| text.push_str(&engine(work)));
@@ -51,7 +57,7 @@ fn engine(work: &Work) -> String {
          {:<22} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}  0 to max\n",
         "per packet", "mean", "10 %", "median", "90 %", "99 %", "max"
     );
-    let rows: [(&str, &Spread); 7] = [
+    let rows: [(&str, &Spread); 8] = [
         ("node visits", &p.nodes),
         ("box tests", &p.boxes),
         ("leaf visits", &p.leaves),
@@ -59,6 +65,7 @@ fn engine(work: &Work) -> String {
         ("lanes in nodes, %", &p.node_lanes),
         ("lanes in primitives, %", &p.prim_lanes),
         ("bytes looked at", &p.bytes),
+        ("rays part at depth", &p.divergence),
     ];
     // A single ray meets a node's boxes all at once; it counts none.
     for (name, s) in rows.into_iter().filter(|(_, s)| s.max > 0.0) {
@@ -76,13 +83,26 @@ fn engine(work: &Work) -> String {
     }
     let _infallible = write!(
         text,
-        "  per ray: {:.2} node visits, {:.2} leaves, {:.2} primitive tests",
-        work.nodes_per_ray, work.leaves_per_ray, work.prims_per_ray,
+        "  per ray: {:.2} node visits, {:.2} leaves, {:.2} primitive tests, {:.0} bytes looked at",
+        work.nodes_per_ray, work.leaves_per_ray, work.prims_per_ray, work.bytes_per_ray,
     );
     text.push_str(&match 100.0 * work.boxes_passed {
         0.0 => "\n".to_string(),
         share => format!("; {share:.0} % of the boxes of visited nodes met the packet's bounds and were tested\n"),
     });
+    if let Some(together) = work.together {
+        let _infallible = writeln!(text, "  {:.0} % of the packets stay together down to the leaves", 100.0 * together);
+    }
+    match &work.limit {
+        Some(Limit { ns_per_ray, boxes, measured_ns_per_ray, percent }) => {
+            let _infallible = writeln!(
+                text,
+                "  limit: {ns_per_ray:.1} ns per ray for the counted tests alone ({boxes:.1} of them boxes); measured \
+                 {measured_ns_per_ray:.1} ns: {percent:.0} % of the limit"
+            );
+        }
+        None => text.push_str("  limit: not known, there are other primitives than triangles\n"),
+    }
     if let Some(s) = &work.shares {
         let _infallible = writeln!(
             text,

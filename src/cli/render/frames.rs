@@ -82,7 +82,7 @@ fn all<S: Engines>(
     let mut before: Option<World<S>> = None;
     for frame in std::iter::once(Ok(first)).chain(rest) {
         let (args, description) = frame?;
-        let world = World::<S>::compile_after(&description, args.scene.options.preset(), before.as_ref())?;
+        let world = World::<S>::compile_after(&description, args.scene.options.build(), before.as_ref())?;
         picture(&args, &description, options, &world, false)?;
         before = Some(world);
     }

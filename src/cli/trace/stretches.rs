@@ -44,7 +44,7 @@ struct Report<'a> {
 pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f32>) -> Result<()> {
     let scalar = args.engine.find::<S>()?.lanes() == 1;
     let workers = Workers::new(args.threads.count())?;
-    let world = workers.install(|| World::<S>::compile(description, args.scene.options.preset()))?;
+    let world = workers.install(|| World::<S>::compile(description, args.scene.options.build()))?;
     let batches = split::<S>(rays);
     let pass = |scalar: bool| workers.install(|| all(&world, &batches, scalar));
     let found = pass(scalar);

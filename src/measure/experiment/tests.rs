@@ -16,6 +16,7 @@ const WHOLE: &str = "experiment \"growth\" {
     threads 1 2
     repeat 3
     preset fast best
+    leaf 2 8
     precision f32
 }";
 
@@ -23,16 +24,16 @@ const WHOLE: &str = "experiment \"growth\" {
 fn cases_are_the_product() {
     let e = parsed(WHOLE).unwrap();
     assert_eq!((e.name.as_str(), e.question.as_str(), e.rays.len()), ("growth", "how?", 2));
-    assert_eq!(e.cases.len(), 3 * 2 * 2 * 2 * 2);
+    assert_eq!(e.cases.len(), 3 * 2 * 2 * 2 * 2 * 2);
     let labels: HashSet<String> = e.cases.iter().map(Case::label).collect();
     assert_eq!(labels.len(), e.cases.len(), "labels tell cases apart");
     assert!(labels.iter().all(|l| l.chars().all(|c| c.is_ascii_alphanumeric() || "-.".contains(c))), "{labels:?}");
     assert_eq!(
         e.cases[0].command(RayKind::Diffuse),
         "lanecast bench builtin:terrain --set size=10 --set seed=1 --rays diffuse --engines scalar,tile --peers obvhs \
-         --size 64x32 --threads 1 --repeat 3 --seed 1 --preset fast --precision f32"
+         --size 64x32 --threads 1 --repeat 3 --seed 1 --preset fast --leaf 2 --precision f32"
     );
-    assert_eq!(e.cases[0].label(), "terrain-size-10-seed-1-64x32-t1-fast-f32");
+    assert_eq!(e.cases[0].label(), "terrain-size-10-seed-1-64x32-t1-fast-leaf-2-f32");
     let small = parsed("experiment \"x\" { scenes \"builtin:cornell\"; }").unwrap();
     assert_eq!((small.cases.len(), small.rays), (1, vec![RayKind::Primary]));
 }
@@ -51,6 +52,7 @@ fn faults_say_where_and_what_is_near() {
         ("experiment \"x\" { scenes a\n preset besst }", "did you mean `best`?"),
         ("experiment \"x\" { scenes a\n size 12 }", "expected a size"),
         ("experiment \"x\" { scenes a\n threads 0 }", "above 0"),
+        ("experiment \"x\" { scenes a\n leaf 9 }", "e.kdl:2:7: expected a number of primitives from 1 to 8"),
         ("experiment \"x\" { scenes a\n repeat }", "1 to 100 values after `repeat`"),
         ("experiment \"x\" { scenes a\n scenes b }", "given twice"),
         ("experiment \"x\" { scenes a\n vary n }", "1 to 1000 variations"),
@@ -74,12 +76,14 @@ fn faults_say_where_and_what_is_near() {
 #[test]
 fn shipped_experiments_are_sound() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/experiments");
+    let guide = std::fs::read_to_string(folder.join("../../docs/EXPERIMENTS.md")).unwrap();
     let mut count = 0;
     for entry in std::fs::read_dir(&folder).unwrap() {
         let path = entry.unwrap().path();
         let e = parse(&path, &std::fs::read(&path).unwrap()).unwrap();
         assert_eq!(path.file_stem().unwrap().to_str(), Some(e.name.as_str()), "the file is called as the experiment");
         assert!(e.question.ends_with('?') && !e.cases.is_empty(), "{}", path.display());
+        assert!(guide.contains(&format!("| `{}` | ", e.name)), "docs/EXPERIMENTS.md has no line for {}", e.name);
         for case in &e.cases {
             // Scenes with these parameters exist; the large ones are left to the experiment itself.
             if case.set.iter().all(|(_, value)| value.parse::<f64>().is_ok_and(|x| x < 300.0)) {
@@ -89,6 +93,9 @@ fn shipped_experiments_are_sound() {
                 )
                 .unwrap();
             }
+            let size = case.set.iter().find(|(name, _)| name == "size" && case.scene == "builtin:terrain");
+            let largest = crate::scene::kdl::terrain::MAX_SIZE;
+            assert!(size.is_none_or(|(_, value)| value.parse::<u32>().is_ok_and(|x| x <= largest)), "{size:?}");
             assert!(crate::scene::builtin::text(case.scene.trim_start_matches("builtin:")).is_some(), "{}", case.scene);
             for name in &case.engines {
                 let known = if case.precision == "f64" {
@@ -101,5 +108,5 @@ fn shipped_experiments_are_sound() {
         }
         count += 1;
     }
-    assert!(count >= 6, "only {count} experiments");
+    assert!(count >= 10, "only {count} experiments");
 }

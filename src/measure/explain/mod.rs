@@ -4,6 +4,8 @@
 //! n aligned consecutive rays, a square block of pixels. (`tile` chooses what to do by what its last tiles showed, so a
 //! block alone may be treated a little differently than in a stream.)
 
+mod divergence;
+mod limit;
 mod share;
 mod spread;
 mod tree;
@@ -17,8 +19,9 @@ use crate::error::{Error, Result};
 use crate::measure::raysets::{Query, RayKind};
 use crate::ray::{Counters, Hits, Rays};
 use crate::scene::world::World;
-use crate::trace::{Engine, Engines, Scratch};
+use crate::trace::{Engine, Engines, Scratch, engine};
 
+pub use limit::{Costs, Limit, costs, is_of_triangles};
 pub use share::Shares;
 pub use spread::Spread;
 pub use tree::{Quality, quality};
@@ -47,10 +50,16 @@ pub struct Work {
     pub leaves_per_ray: f64,
     /// Primitive tests.
     pub prims_per_ray: f64,
+    /// Bytes of nodes and leaf blocks that were looked at.
+    pub bytes_per_ray: f64,
+    /// Of packets with two or more live rays, the share whose rays stay together down to the leaves; `None` for single rays.
+    pub together: Option<f64>,
     /// Of the boxes of visited nodes, the share that met the packet's bounds and was tested (single rays: met the ray).
     pub boxes_passed: f64,
     /// Million rays per second of the fastest passes, one thread, live rays only.
     pub mrays_per_s: f64,
+    /// The time its tests would take alone; `None` if there are other primitives than triangles.
+    pub limit: Option<Limit>,
     /// Where the time goes, by a fit; `None` if there are too few batches or the fit says nothing.
     pub shares: Option<Shares>,
     /// Node visits and primitive tests per ray of each pixel, if the rays belong to pixels.
@@ -75,6 +84,9 @@ pub struct PerPacket {
     pub prim_lanes: Spread,
     /// Bytes of nodes and leaf blocks that were looked at, again and again if need be.
     pub bytes: Spread,
+    /// Depth in the tree at which some, but not all rays of a packet go on (1: the root's children); packets that stay
+    /// together are left out.
+    pub divergence: Spread,
 }
 
 /// Values per pixel, row-major.
@@ -89,7 +101,7 @@ pub struct Maps {
 }
 
 /// Counts and times `engine` on `batches` of the class `kind`, made for a picture of `size`. Counting runs on the current
-/// rayon pool, the clock on one thread.
+/// rayon pool, the clock on one thread. `costs`: what [`costs()`] measured.
 ///
 /// # Errors
 /// [`Error::Interrupted`] when `stop` says so.
@@ -99,6 +111,7 @@ pub fn work<S: Engines>(
     batches: &[Rays<S>],
     kind: RayKind,
     size: (u32, u32),
+    costs: &Costs,
     stop: &dyn Fn() -> bool,
 ) -> Result<Work> {
     let lanes = engine.lanes().max(1);
@@ -114,6 +127,8 @@ pub fn work<S: Engines>(
     let share = |active: u64, lanes: u64| 100.0 * active as f64 / lanes.max(1) as f64;
     let (node_bytes, leaf_bytes) = sizes(world);
     let rays = total.rays.max(1) as f64;
+    let bytes = |c: &Counters| c.nodes as f64 * node_bytes + c.leaves as f64 * leaf_bytes;
+    let (depths, packets_of_many) = divergence(world, batches, lanes)?;
     let (seconds, shares) = clock(engine, world, batches, query, stop)?;
     Ok(Work {
         engine: engine.name(),
@@ -127,14 +142,18 @@ pub fn work<S: Engines>(
             prims: spread(&|c| c.prims as f64),
             node_lanes: spread(&|c| share(c.node_lanes_active, c.node_lanes_total)),
             prim_lanes: spread(&|c| share(c.prim_lanes_active, c.prim_lanes_total)),
-            bytes: spread(&|c| c.nodes as f64 * node_bytes + c.leaves as f64 * leaf_bytes),
+            bytes: spread(&bytes),
+            divergence: Spread::of(depths.iter().map(|&depth| f64::from(depth)).collect()),
         },
         nodes_per_ray: total.nodes as f64 / rays,
         boxes_per_ray: total.boxes as f64 / rays,
         leaves_per_ray: total.leaves as f64 / rays,
         prims_per_ray: total.prims as f64 / rays,
+        bytes_per_ray: bytes(&total) / rays,
+        together: (packets_of_many > 0).then(|| 1.0 - depths.len() as f64 / packets_of_many as f64),
         boxes_passed: total.boxes as f64 / (8 * total.nodes).max(1) as f64,
         mrays_per_s: if seconds > 0.0 { total.rays as f64 / seconds / 1e6 } else { 0.0 },
+        limit: if is_of_triangles(world) { Limit::of(costs, &total, seconds) } else { None },
         shares,
         maps: (kind != RayKind::Scatter).then(|| maps(&counted, lanes, size)).transpose()?,
     })
@@ -160,6 +179,27 @@ fn count<S: Engines>(engine: &dyn Engine<S>, world: &World<S>, rays: &Rays<S>, q
         Query::Any => engine.occluded(world, rays, &mut Vec::new(), &mut scratch, Some(&mut counters)),
     }
     counters
+}
+
+/// Of all packets of `lanes` rays, where their rays part (those that do), and how many have two or more live rays.
+fn divergence<S: Engines>(world: &World<S>, batches: &[Rays<S>], lanes: usize) -> Result<(Vec<u32>, usize)> {
+    if lanes < 2 {
+        return Ok((Vec::new(), 0));
+    }
+    let scalar = engine::<S>("scalar")?;
+    let of_batch = |rays: &Rays<S>| {
+        let mut hits = Hits::new(0);
+        scalar.intersect(world, rays, &mut hits, &mut Scratch::default(), None);
+        let ends: Vec<S> = (0..rays.len()).map(|i| if hits.is_hit(i) { hits.t[i] } else { rays.t_max[i] }).collect();
+        let firsts = (0..rays.len()).step_by(lanes);
+        let live = |first: usize| (first..rays.len().min(first + lanes)).filter(|&i| rays.is_live(i)).count();
+        let many = firsts.clone().filter(|&first| live(first) > 1).count();
+        let depth = |first| divergence::depth(world, rays, &ends, first, lanes);
+        (firsts.filter_map(depth).collect::<Vec<_>>(), many)
+    };
+    let found: Vec<_> = batches.par_iter().map(of_batch).collect();
+    let many = found.iter().map(|(_, many)| many).sum();
+    Ok((found.into_iter().flat_map(|(depths, _)| depths).collect(), many))
 }
 
 /// Bytes of a node and, on average, of a leaf block.
@@ -225,14 +265,15 @@ mod tests {
     use crate::scene::description::{CameraDescription, Description, Projection};
     use crate::scene::load::{LoadOptions, load};
     use crate::scene::world::Preset;
-    use crate::trace::engine;
+
+    const COSTS: Costs = Costs { lanes: 16, ns_box: 1.0, ns_triangle: 2.0, ns_linear: 0.5 };
 
     fn cornell() -> (World<f32>, Vec<Rays<f32>>, Description) {
         let scene = load("builtin:cornell", &LoadOptions::default()).unwrap();
         let world = World::<f32>::compile(&scene, Preset::Fast).unwrap();
         let framing = |_| -> Result<CameraDescription> { Ok(scene.cameras[0].clone()) };
         let view = View::new(&world, &scene, &framing, (64, 40), 1).unwrap();
-        let rays = view.rays(&world, RayKind::Primary);
+        let rays = view.rays(&world, RayKind::Primary).unwrap();
         (world, rays, scene)
     }
 
@@ -241,9 +282,9 @@ mod tests {
     fn packets_add_up_to_the_whole() {
         let (world, batches, scene) = cornell();
         assert!(matches!(scene.cameras[0].projection, Projection::Perspective { .. }), "a camera with one origin");
-        for name in ["scalar", "packet8"] {
+        for name in ["scalar", "packet16"] {
             let engine = engine::<f32>(name).unwrap();
-            let work = work(engine, &world, &batches, RayKind::Primary, (64, 40), &|| false).unwrap();
+            let work = work(engine, &world, &batches, RayKind::Primary, (64, 40), &COSTS, &|| false).unwrap();
             let mut whole = Counters::default();
             batches.iter().for_each(|rays| whole += count(engine, &world, rays, Query::Closest));
             assert_eq!((work.rays, work.packets), (whole.rays, 2560 / work.lanes as u64), "{name}");
@@ -253,6 +294,13 @@ mod tests {
             let mapped: f64 = maps.nodes.iter().map(|&x| f64::from(x)).sum();
             assert!((mapped - whole.nodes as f64).abs() < 1e-3 * mapped, "{name}: {mapped} {}", whole.nodes);
             assert!(work.mrays_per_s > 0.0 && work.per_packet.node_lanes.max <= 100.0);
+            // Every node visit tests eight boxes against bounds, every box that is met is tested against all lanes.
+            let lanes = if name == "scalar" { 0 } else { work.lanes as u64 * whole.boxes };
+            assert_eq!(whole.box_lanes, 8 * whole.nodes + lanes, "{name}");
+            assert_eq!(work.together.is_some(), work.lanes > 1, "single rays have nobody to part from");
+            let limit = work.limit.unwrap();
+            let tests = whole.box_lanes as f64 + 2.0 * whole.prim_lanes_total as f64;
+            assert!((limit.ns_per_ray * whole.rays as f64 - tests).abs() < 1e-9 * tests, "{name}: {limit:?}");
         }
     }
 
@@ -261,10 +309,11 @@ mod tests {
         let (world, batches, _) = cornell();
         let nodes = |name| {
             let engine = engine::<f32>(name).unwrap();
-            work(engine, &world, &batches, RayKind::Primary, (64, 40), &|| false).unwrap().nodes_per_ray
+            work(engine, &world, &batches, RayKind::Primary, (64, 40), &COSTS, &|| false).unwrap().nodes_per_ray
         };
         assert!(nodes("packet16") < 0.3 * nodes("scalar"));
-        let stopped = work(engine::<f32>("scalar").unwrap(), &world, &batches, RayKind::Primary, (64, 40), &|| true);
+        let stopped =
+            work(engine::<f32>("scalar").unwrap(), &world, &batches, RayKind::Primary, (64, 40), &COSTS, &|| true);
         assert!(matches!(stopped, Err(Error::Interrupted)));
     }
 }

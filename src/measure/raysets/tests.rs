@@ -96,7 +96,7 @@ fn a_miss_makes_a_dead_ray() {
     let mut starts = floor(1);
     starts.batches[0][3] = None;
     assert_eq!(starts.count(), BATCH - 1);
-    for kind in [RayKind::Shadow, RayKind::Ao, RayKind::Reflect, RayKind::Diffuse] {
+    for kind in RayKind::ALL.into_iter().filter(|kind| kind.parent().is_some()) {
         let rays = &starts.rays(kind, &setting())[0];
         assert_eq!((rays.len(), rays.live_count(), rays.is_live(3)), (BATCH, BATCH - 1, false), "{}", kind.name());
     }

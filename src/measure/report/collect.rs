@@ -38,7 +38,8 @@ pub struct Run {
     pub facts: Vec<(String, String)>,
 }
 
-/// One row, by column.
+/// One row, by column. Besides the file's columns there are `preset`, `leaf` and `set`: what its command says of them, empty
+/// if it says nothing.
 #[derive(Debug)]
 pub struct Row {
     /// Which of the runs.
@@ -71,18 +72,6 @@ impl Row {
     /// Whether this is one of our engines, or the fastest mode of a peer.
     pub fn is_quoted(&self) -> bool {
         self.text("quoted") != "false"
-    }
-
-    /// The build preset that its command names; empty if it names none.
-    pub fn preset(&self) -> &str {
-        let mut words = self.text("command").split_ascii_whitespace();
-        words
-            .find_map(|word| match word.strip_prefix("--preset") {
-                Some("") => Some(""),
-                Some(rest) => rest.strip_prefix('='),
-                None => None,
-            })
-            .map_or("", |value| if value.is_empty() { words.next().unwrap_or_default() } else { value })
     }
 
     /// Several columns as one key.
@@ -139,12 +128,35 @@ pub fn collect(folder: &Path) -> Result<Found> {
         let place = if place.is_empty() { ".".into() } else { place };
         let date = rows.first().and_then(|row| row.get("date")).cloned().unwrap_or_default();
         found.runs.push(Run { place, date, facts: facts(&path.with_file_name("bench.env.txt")) });
-        found.rows.extend(rows.into_iter().map(|cells| Row { run, cells }));
+        found.rows.extend(rows.into_iter().map(|cells| Row { run, cells: with_options(cells) }));
         if found.rows.len() > MAX_ROWS {
             return Err(Error::whole(folder, format!("expected at most {MAX_ROWS} rows of results")));
         }
     }
     Ok(found)
+}
+
+/// Adds what the command says.
+fn with_options(mut cells: BTreeMap<String, String>) -> BTreeMap<String, String> {
+    let command = cells.get("command").cloned().unwrap_or_default();
+    for name in ["preset", "leaf"] {
+        cells.insert(name.into(), options(&command, name).last().copied().unwrap_or_default().into());
+    }
+    cells.insert("set".into(), options(&command, "set").join(", "));
+    cells
+}
+
+/// The values of `--name` in a command.
+fn options<'a>(command: &'a str, name: &str) -> Vec<&'a str> {
+    let (mut words, mut values) = (command.split_ascii_whitespace(), Vec::new());
+    while let Some(word) = words.next() {
+        match word.strip_prefix("--").and_then(|word| word.strip_prefix(name)) {
+            Some("") => values.extend(words.next()),
+            Some(rest) => values.extend(rest.strip_prefix('=')),
+            None => {}
+        }
+    }
+    values
 }
 
 fn walk(folder: &Path, depth: usize, tables: &mut Vec<PathBuf>, pictures: &mut Vec<PathBuf>) -> Result<()> {

@@ -1,11 +1,12 @@
 //! The report: everything a folder of results holds as one page that needs nothing else: no network, no other file.
 //!
 //! `collect` finds rows and pictures, `figures` turns rows into plots with the table behind each, `plot` draws SVG,
-//! `pictures` pairs and compares pictures, `page` lays all of it out.
+//! `pictures` pairs and compares pictures, `page` lays all of it out; `markdown` puts figures into a text instead.
 
 mod collect;
 mod figures;
 mod history;
+mod markdown;
 mod page;
 mod pictures;
 mod plot;
@@ -14,7 +15,10 @@ mod scaling;
 
 use std::path::Path;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
+
+/// Largest text that figures are put into, bytes.
+const MAX_TEXT: u64 = 16 << 20;
 
 /// What a report is made from, and what it says about itself.
 #[derive(Clone, Debug, Default)]
@@ -59,6 +63,20 @@ pub fn html(folder: &Path, options: &Options) -> Result<(String, Summary)> {
     let name = folder.canonicalize().ok().and_then(|p| Some(p.file_name()?.to_string_lossy().into_owned()));
     let title = options.title.clone().or(name).unwrap_or_else(|| "results".into());
     Ok((page::page(&title, options, &found, sections).into_string(), summary))
+}
+
+/// The text of `file` with the figures between its marks (docs/METHODOLOGY.md) made anew from the newest rows in `folder`, and
+/// the number of places.
+///
+/// # Errors
+/// As [`html`]; a text that cannot be read, has no marks, or asks for what no run holds, with the line.
+pub fn figures_in(file: &Path, folder: &Path) -> Result<(String, usize)> {
+    let size = std::fs::metadata(file).map_err(|e| Error::io(file, e))?.len();
+    if size > MAX_TEXT {
+        return Err(Error::whole(file, format!("expected at most {MAX_TEXT} bytes of text, found {size}")));
+    }
+    let text = std::fs::read_to_string(file).map_err(|e| Error::io(file, e))?;
+    markdown::fill(&text, file, &collect::collect(folder)?)
 }
 
 #[cfg(test)]

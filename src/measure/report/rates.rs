@@ -10,16 +10,15 @@ use super::plot::{Bar, bars};
 use crate::measure::intervals::{Estimate, Interval};
 
 /// What distinguishes one figure from another.
-const FIGURE: [&str; 4] = ["scene", "precision", "threads", "rays"];
+const FIGURE: [&str; 8] = ["scene", "precision", "threads", "rays", "preset", "leaf", "set", "scene_hash"];
 
 /// Rows of each figure: of every scene and setting, and every ray class, those of the newest run, in written order.
 fn newest(found: &Found) -> Vec<(String, Vec<&Row>)> {
-    let mut groups: BTreeMap<([String; 4], String, String), Vec<&Row>> = BTreeMap::new();
+    let mut groups: BTreeMap<[String; 8], Vec<&Row>> = BTreeMap::new();
     for row in &found.rows {
-        let key = (row.key(FIGURE), row.preset().to_string(), row.text("scene_hash").into());
-        groups.entry(key).or_default().push(row);
+        groups.entry(row.key(FIGURE)).or_default().push(row);
     }
-    let figures = groups.into_iter().map(|((key, preset, _), rows)| {
+    let figures = groups.into_iter().map(|(key, rows)| {
         let mut last: BTreeMap<&str, usize> = BTreeMap::new();
         for row in &rows {
             let run = last.entry(row.text("class")).or_default();
@@ -27,11 +26,14 @@ fn newest(found: &Found) -> Vec<(String, Vec<&Row>)> {
         }
         let is_last = |row: &&Row| row.is_quoted() && last.get(row.text("class")) == Some(&row.run);
         let rows: Vec<&Row> = rows.iter().copied().filter(is_last).collect();
-        let [scene, precision, threads, rays] = key;
+        let [scene, precision, threads, rays, preset, leaf, set, _] = key;
         let prims = rows.first().map_or("", |row| row.text("prims"));
         let plural = if threads == "1" { "" } else { "s" };
         let preset = if preset.is_empty() { preset } else { format!(", preset {preset}") };
-        (format!("{scene}: {prims} primitives, {rays} rays, {precision}, {threads} thread{plural}{preset}"), rows)
+        let leaf = if leaf.is_empty() { leaf } else { format!(", leaves of up to {leaf}") };
+        let set = if set.is_empty() { set } else { format!(", {set}") };
+        let how = format!("{rays} rays, {precision}, {threads} thread{plural}{preset}{leaf}{set}");
+        (format!("{scene}: {prims} primitives, {how}"), rows)
     });
     figures.collect()
 }
@@ -122,8 +124,9 @@ pub fn limits(found: &Found) -> Option<Section> {
             figures.push(figure(&title, plot, &table(&head, &body), &rows));
         }
     }
-    let about = "Counted node, leaf and frustum tests times their cycle cost give the rate at which the machine could do just \
-                 that work and nothing else.";
+    let about = "Counted box and triangle tests times what single tests took in the same run, in full vectors over data in the \
+                 first cache, give the rate at which the machine could do just these tests and nothing else. An engine that \
+                 makes fewer tests has a higher limit; docs/METHODOLOGY.md says what the limit is not. Scenes of triangles only.";
     Section::of_figures("limits", "Achieved against the limit", about, figures)
 }
 

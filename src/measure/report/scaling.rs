@@ -1,4 +1,4 @@
-//! How rates change with the number of threads, of primitives and of rays in the same picture.
+//! How rates change with the number of threads, of primitives and of rays in the same picture, and with the size of leaves.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,34 +16,41 @@ struct Axis {
     /// Its name on the plot.
     unit: &'static str,
     /// What stays the same within a figure.
-    same: [&'static str; 5],
+    same: &'static [&'static str],
     /// Fewest different values that make a figure.
     least: usize,
     places: Places,
 }
 
-fn axes() -> [Axis; 3] {
+fn axes() -> [Axis; 4] {
     [
         Axis {
             column: "threads",
             unit: "threads",
-            same: ["scene", "scene_hash", "class", "precision", "rays"],
+            same: &["scene", "scene_hash", "class", "precision", "rays"],
             least: 2,
             places: Places::Linear,
         },
         Axis {
             column: "prims",
             unit: "primitives",
-            same: ["scene", "threads", "class", "precision", "rays"],
+            same: &["scene", "threads", "class", "precision", "rays"],
             least: 3,
             places: Places::Logarithmic,
         },
         Axis {
             column: "rays",
             unit: "rays",
-            same: ["scene", "scene_hash", "class", "precision", "threads"],
+            same: &["scene", "scene_hash", "class", "precision", "threads"],
             least: 3,
             places: Places::Logarithmic,
+        },
+        Axis {
+            column: "leaf",
+            unit: "primitives in a leaf at most",
+            same: &["scene", "scene_hash", "class", "precision", "rays", "threads"],
+            least: 2,
+            places: Places::Linear,
         },
     ]
 }
@@ -56,16 +63,17 @@ pub fn section(found: &Found) -> Option<Section> {
 }
 
 fn of_axis(found: &Found, axis: &Axis) -> Vec<Markup> {
-    let mut groups: BTreeMap<[String; 5], Vec<&Row>> = BTreeMap::new();
-    for row in found.rows.iter().filter(|row| row.is_timed() && row.is_quoted()) {
-        groups.entry(row.key(axis.same)).or_default().push(row);
+    let mut groups: BTreeMap<Vec<&str>, Vec<&Row>> = BTreeMap::new();
+    let placed = |row: &&Row| row.is_timed() && row.is_quoted() && row.number(axis.column).is_some();
+    for row in found.rows.iter().filter(placed) {
+        groups.entry(axis.same.iter().map(|column| row.text(column)).collect()).or_default().push(row);
     }
     let distinct = |rows: &[&Row]| rows.iter().map(|row| row.text(axis.column)).collect::<BTreeSet<_>>().len();
     groups.retain(|_, rows| distinct(rows) >= axis.least);
-    groups.into_iter().map(|(key, rows)| one(axis, &key, &rows)).collect()
+    groups.into_values().filter_map(|rows| one(axis, &rows)).collect()
 }
 
-fn one(axis: &Axis, key: &[String; 5], rows: &[&Row]) -> Markup {
+fn one(axis: &Axis, rows: &[&Row]) -> Option<Markup> {
     // By engine, then by place; a later run replaces an earlier one.
     let mut series: BTreeMap<String, BTreeMap<u64, (Estimate, &Row)>> = BTreeMap::new();
     for row in rows {
@@ -92,8 +100,10 @@ fn one(axis: &Axis, key: &[String; 5], rows: &[&Row]) -> Markup {
         })
         .collect();
     let head = ["engine", axis.unit, "Mrays/s (95 %)", "over the first"];
-    let [scene, _, class, precision, last] = key;
-    let title = format!("{scene}, {class} rays over {} ({precision}, {}: {last})", axis.unit, axis.same[4]);
+    let [scene, class, precision] = ["scene", "class", "precision"].map(|column| rows.first().map(|r| r.text(column)));
+    let (scene, class, precision, last) = (scene?, class?, precision?, axis.same.last()?);
+    let last = format!("{last}: {}", rows.first()?.text(last));
+    let title = format!("{scene}, {class} rays over {} ({precision}, {last})", axis.unit);
     let plot = lines(&drawn, &axis.places, axis.unit, "million rays per second");
-    figure(&title, plot, &table(&head, &body), &used)
+    Some(figure(&title, plot, &table(&head, &body), &used))
 }

@@ -20,6 +20,7 @@ fn row(scene: &str, prims: u64, engine: &'static str, seconds: f64) -> Row {
         ratio: None,
         node_lane_use: Some(0.5),
         prim_lane_use: None,
+        percent_of_limit: Some(40.0),
     };
     Row {
         scene,
@@ -91,7 +92,7 @@ fn the_page_is_whole_and_needs_nothing_else() {
     // What files say is text, not markup.
     assert!(text.contains("A &lt;fast&gt; CPU") && !text.contains("<fast>"));
     let ids: Vec<&str> = all(&page, "main > section").iter().filter_map(|s| s.value().id()).collect();
-    assert_eq!(ids, ["machine", "rates", "scaling", "accuracy", "pictures", "history"]);
+    assert_eq!(ids, ["machine", "rates", "scaling", "limits", "accuracy", "pictures", "history"]);
     for link in all(&page, "nav a") {
         let target = link.attr("href").unwrap().trim_start_matches('#');
         assert!(ids.contains(&target), "{target}");
@@ -133,6 +134,8 @@ fn figures_are_those_of_the_rows() {
     assert!(scaling.iter().any(|r| r.starts_with("tile|2|") && r.ends_with("|2.00")), "{scaling:?}");
     let accuracy = rows_of("accuracy").join("\n");
     assert!(accuracy.contains("primary|tile|5|1|0|yes|ok"), "{accuracy}");
+    let limits = rows_of("limits");
+    assert!(limits.iter().any(|r| r.starts_with("primary|tile|") && r.ends_with("|40 %")), "{limits:?}");
     let slider = all(&page, ".slider");
     assert_eq!(slider.len(), 1);
     assert_eq!(all(&page, ".slider img").len(), 2);

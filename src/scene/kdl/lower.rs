@@ -306,8 +306,11 @@ impl<'a, 'n> Lowering<'a, 'n> {
         let allowed = if is_terrain { ["size", "seed", "material"] } else { ["leaves", "seed", "material"] };
         let fields = self.fields(node, &allowed, &transform::NAMES)?;
         fields.no_arguments()?;
-        let amount =
-            if is_terrain { fields.whole("size", 224, 1..=2048)? } else { fields.whole("leaves", 60, 1..=100_000)? };
+        let amount = if is_terrain {
+            fields.whole("size", 224, 1..=terrain::MAX_SIZE)?
+        } else {
+            fields.whole("leaves", 60, 1..=100_000)?
+        };
         let seed = fields.whole("seed", 1, 0..=u32::MAX)?;
         let place = self.place(&fields, &fields.rest, &allowed, place)?;
         let key = if is_terrain { Key::Terrain(amount, seed) } else { Key::Twig(amount, seed) };

@@ -30,7 +30,7 @@ mod sky;
 mod solids;
 pub(crate) mod source;
 pub(crate) mod syntax;
-mod terrain;
+pub mod terrain;
 #[cfg(test)]
 mod tests;
 mod token;

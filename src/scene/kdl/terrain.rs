@@ -9,6 +9,8 @@ use glam::DVec3;
 use super::hash::{mix3, unit};
 use crate::scene::mesh::Mesh;
 
+/// Largest field: ten million triangles.
+pub const MAX_SIZE: u32 = 2300;
 /// Octaves summed.
 const OCTAVES: u32 = 6;
 /// Lattice cells of the lowest octave across the field.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::runs::Runs;
 use super::{Class, Counts, Instance, Object, PlacedSolid, World, solids, successor};
-use crate::bvh::{self, LEAF_PRIMS, Leaf, Preset, Tree};
+use crate::bvh::{self, BuildSettings, LEAF_PRIMS, Leaf, Preset, Tree};
 use crate::error::Result;
 use crate::lanes::Real;
 use crate::math::{Aabb, Affine, transformed_bounds};
@@ -24,21 +24,25 @@ use crate::shape::{
 const _: () = assert!(BLOCK == LEAF_PRIMS);
 
 impl<S: Real> World<S> {
-    /// Compiles `description` with tree quality `preset`, on the current rayon pool.
+    /// Compiles `description` with trees as `settings` (or a [`Preset`]) say, on the current rayon pool.
     ///
     /// # Errors
     /// Those of [`Assembly::new`].
-    pub fn compile(description: &Description, preset: Preset) -> Result<Self> {
-        Self::compile_after(description, preset, None)
+    pub fn compile(description: &Description, settings: impl Into<BuildSettings>) -> Result<Self> {
+        Self::compile_after(description, settings, None)
     }
 
-    /// As [`Self::compile`], but objects whose geometry `before`, compiled with the same preset, has too are copied from
+    /// As [`Self::compile`], but objects whose geometry `before`, compiled with the same settings, has too are copied from
     /// it. The world is the same, to the last bit.
     ///
     /// # Errors
     /// Those of [`Assembly::new`].
-    pub fn compile_after(description: &Description, preset: Preset, before: Option<&Self>) -> Result<Self> {
-        let start = Instant::now();
+    pub fn compile_after(
+        description: &Description,
+        settings: impl Into<BuildSettings>,
+        before: Option<&Self>,
+    ) -> Result<Self> {
+        let (start, settings) = (Instant::now(), settings.into());
         let assembly = Assembly::new(description)?;
         let mut counts = Vec::with_capacity(assembly.objects.len());
         let mut objects = Vec::with_capacity(assembly.objects.len());
@@ -46,13 +50,13 @@ impl<S: Real> World<S> {
             let known = before.and_then(|world| Some((world, successor::find(object, &world.assembly.objects)?)));
             let (built, count) = match known {
                 Some((world, same)) => (world.objects[same].clone(), world.counts[same]),
-                None => build(object, preset),
+                None => build(object, settings),
             };
             objects.push(built);
             counts.push(count);
         }
         let instances: Vec<_> = assembly.placements.iter().map(|p| instance(p, &objects)).collect();
-        let (top, top_blocks, unbounded_instances) = upper_tree(&instances, preset);
+        let (top, top_blocks, unbounded_instances) = upper_tree(&instances, settings.preset);
         let runs = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
         let build_seconds = start.elapsed().as_secs_f64();
         Ok(Self { assembly, objects, instances, top, top_blocks, unbounded_instances, runs, counts, build_seconds })
@@ -60,12 +64,12 @@ impl<S: Real> World<S> {
 }
 
 /// One object, and what was dropped of it.
-fn build<S: Real>(object: &AssemblyObject, preset: Preset) -> (Object<S>, Counts) {
+fn build<S: Real>(object: &AssemblyObject, settings: BuildSettings) -> (Object<S>, Counts) {
     let (mut primitives, mut counts) = (Primitives::default(), Counts::default());
     for part in &object.parts {
-        primitives.add(part, preset, &mut counts);
+        primitives.add(part, settings.preset, &mut counts);
     }
-    (primitives.build(preset), counts)
+    (primitives.build(settings), counts)
 }
 
 /// A primitive's numbers before it has a place in a block.
@@ -183,8 +187,8 @@ impl<S: Real> Primitives<S> {
         }
     }
 
-    fn build(mut self, preset: Preset) -> Object<S> {
-        let (tree, leaves) = bvh::build(&self.boxes, &self.classes, preset);
+    fn build(mut self, settings: BuildSettings) -> Object<S> {
+        let (tree, leaves) = bvh::build(&self.boxes, &self.classes, settings);
         let mut object = Object {
             tree,
             triangles: Vec::new(),

@@ -11,7 +11,7 @@ mod surface;
 
 use glam::DVec3;
 
-pub use crate::bvh::Preset;
+pub use crate::bvh::{BuildSettings, Preset};
 pub use surface::Surface;
 
 use self::runs::Runs;

@@ -2,7 +2,7 @@
 
 use super::chunk::{Best, Chunk, RAYS};
 use super::{leaf, node};
-use crate::bvh::{Child, Node, Tree};
+use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::words::prefetch_either;
 use crate::lanes::{Lanes, Real};
 use crate::ray::Counters;
@@ -125,6 +125,7 @@ impl<S: Real> Walk<'_, S> {
                 let node = &tree.nodes[child.index as usize];
                 if COUNT {
                     self.counters.nodes += 1;
+                    self.counters.box_lanes += WIDTH as u64 * u64::from(rays.count_ones());
                     self.counters.node_lanes_active += u64::from(rays.count_ones());
                     self.counters.node_lanes_total += RAYS as u64;
                 }

@@ -69,6 +69,10 @@ pub struct Memory {
 #[derive(Clone, Copy, Debug)]
 pub struct Tile<const EXACT: bool>;
 
+/// `tile` with fewer groups at most in one tile: 4 (8x8 rays) or 1 (4x4 rays), to see what the size is worth.
+#[derive(Clone, Copy, Debug)]
+pub struct SmallTile(pub usize);
+
 /// One call of the engine.
 struct Job<'a> {
     world: &'a World<f32>,
@@ -78,6 +82,8 @@ struct Job<'a> {
     stream: &'a mut stream::Memory<f32>,
     counters: &'a mut Counters,
     output: Output<'a, f32>,
+    /// Most groups in a tile: 16, 4 or 1.
+    most: usize,
 }
 
 /// The object of a world that tiles can trace: one object in world space, of triangles only.
@@ -129,11 +135,11 @@ impl Job<'_> {
         for g in (0..bundle::groups(self.rays, bundle.first)).filter(|g| all >> g & 1 == 0) {
             self.packet::<ANY, COUNT>(bundle.first + g * V::N);
         }
-        if self.tile::<ANY, EXACT, COUNT>(object, bundle, all) {
+        if self.most == GROUPS && self.tile::<ANY, EXACT, COUNT>(object, bundle, all) {
             return;
         }
         for quarter in [0xf, 0xf0, 0xf00, 0xf000] {
-            if self.tile::<ANY, EXACT, COUNT>(object, bundle, all & quarter) {
+            if self.most > 1 && self.tile::<ANY, EXACT, COUNT>(object, bundle, all & quarter) {
                 continue;
             }
             for g in (0..GROUPS).filter(|g| (all & quarter) >> g & 1 != 0) {
@@ -250,7 +256,7 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
         counters: Option<&mut Counters>,
     ) {
         hits.prepare(rays.len());
-        call::<false, EXACT>(world, rays, Output::Closest(hits), scratch, counters);
+        call::<false, EXACT>(world, rays, Output::Closest(hits), scratch, counters, GROUPS);
     }
 
     fn occluded(
@@ -263,7 +269,46 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
     ) {
         out.clear();
         out.resize(rays.len(), 0);
-        call::<true, EXACT>(world, rays, Output::Any(out), scratch, counters);
+        call::<true, EXACT>(world, rays, Output::Any(out), scratch, counters, GROUPS);
+    }
+}
+
+impl Engine<f32> for SmallTile {
+    fn name(&self) -> &'static str {
+        if self.0 == 1 { "tile-4x4" } else { "tile-8x8" }
+    }
+
+    fn lanes(&self) -> usize {
+        self.0 * V::N
+    }
+
+    fn is_exact(&self) -> bool {
+        false
+    }
+
+    fn intersect(
+        &self,
+        world: &World<f32>,
+        rays: &Rays<f32>,
+        hits: &mut Hits<f32>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    ) {
+        hits.prepare(rays.len());
+        call::<false, false>(world, rays, Output::Closest(hits), scratch, counters, self.0);
+    }
+
+    fn occluded(
+        &self,
+        world: &World<f32>,
+        rays: &Rays<f32>,
+        out: &mut Vec<u8>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    ) {
+        out.clear();
+        out.resize(rays.len(), 0);
+        call::<true, false>(world, rays, Output::Any(out), scratch, counters, self.0);
     }
 }
 
@@ -273,14 +318,15 @@ fn call<const ANY: bool, const EXACT: bool>(
     output: Output<f32>,
     scratch: &mut Scratch,
     counters: Option<&mut Counters>,
+    most: usize,
 ) {
     let Scratch { single: super::Memory { stack, stream }, tile: memory, .. } = scratch;
     stack.reserve(world.stack_bound());
     match counters {
-        Some(counters) => Job { world, rays, memory, stack, stream, counters, output }.run::<ANY, EXACT, true>(),
+        Some(counters) => Job { world, rays, memory, stack, stream, counters, output, most }.run::<ANY, EXACT, true>(),
         None => {
             let counters = &mut Counters::default();
-            Job { world, rays, memory, stack, stream, counters, output }.run::<ANY, EXACT, false>();
+            Job { world, rays, memory, stack, stream, counters, output, most }.run::<ANY, EXACT, false>();
         }
     }
 }

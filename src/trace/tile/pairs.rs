@@ -55,6 +55,7 @@ pub fn flush<const ANY: bool, const EXACT: bool, const COUNT: bool>(
         if COUNT {
             counters.prims += 1;
             counters.prim_lanes_total += V::N as u64;
+            counters.prim_lanes_linear += V::N as u64;
             let waiting = groups.inv_lo[g].cmp_lt(V::splat(f32::INFINITY));
             counters.prim_lanes_active += u64::from(waiting.bits().count_ones());
         }

@@ -5,7 +5,7 @@ use super::exact::Exact;
 use super::node::{Level, Planes, key};
 use super::pairs::flush;
 use super::{GROUPS, Memory, V};
-use crate::bvh::{Child, Node};
+use crate::bvh::{Child, Node, WIDTH};
 use crate::lanes::Lanes;
 use crate::lanes::words::{least_key, prefetch};
 use crate::ray::Counters;
@@ -87,6 +87,7 @@ fn open<const COUNT: bool>(
     if COUNT {
         counters.nodes += 1;
         counters.boxes += u64::from(node.used);
+        counters.box_lanes += WIDTH as u64;
         counters.node_lanes_active += u64::from(groups.count_ones()) * V::N as u64;
         counters.node_lanes_total += (GROUPS * V::N) as u64;
     }
