@@ -293,34 +293,32 @@ fn a_render_can_be_watched() {
     person.quits();
 }
 
-#[test]
-fn without_a_display_a_render_goes_on_and_says_so() {
-    let dir = tempfile::tempdir().unwrap();
+/// Exit code and standard error of a command where there is no display.
+fn without_display(dir: &Path, line: &str) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_lanecast"))
-        .args(["render", "builtin:die", "-o", "out.png", "--size", "20x20", "--preview", "window"])
-        .current_dir(dir.path())
+        .args(line.split(' '))
+        .current_dir(dir)
         .env_remove("DISPLAY")
         .env_remove("WAYLAND_DISPLAY")
         .env_remove("WAYLAND_SOCKET")
         .output()
         .expect("the binary");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{said}");
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn without_a_display_a_render_goes_on_and_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let (code, said) = without_display(dir.path(), "render builtin:die -o out.png --size 20x20 --preview window");
+    assert_eq!(code, Some(0), "{said}");
     assert!(said.contains("preview: no window") && said.contains("going on without"), "{said}");
     assert!(dir.path().join("out.png").exists());
 }
 
 #[test]
 fn without_a_display_there_is_a_clear_message() {
-    let output = Command::new(env!("CARGO_BIN_EXE_lanecast"))
-        .args(["view", "builtin:die"])
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .env_remove("WAYLAND_SOCKET")
-        .output()
-        .expect("the binary");
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
+    let (code, said) = without_display(Path::new("."), "view builtin:die");
+    assert_eq!(code, Some(2), "{said}");
     assert!(said.starts_with("error: no window") && said.contains("--headless-script"), "{said}");
     assert!(!said.contains("panicked"), "{said}");
 }

@@ -12,7 +12,7 @@ use super::patch::{Patch, channels, empty_film};
 use super::pixels::{add, mean, variance};
 use super::tally::Tally;
 use crate::camera::{Camera, PixelRect, Tiling, fill_tile, morton_decode};
-use crate::error::Result;
+use crate::error::{Result, locked};
 use crate::film::Film;
 use crate::film::Window;
 use crate::lanes::Real;
@@ -91,7 +91,7 @@ pub fn render_with<S: Real>(
     let tiles = tiling.tiles_in(job.rect);
     let paint = |sums: &Sums, pixels: &[(u32, u32)], patch: &mut Patch| {
         job.fill(patch, sums, pixels);
-        patch.paint(&mut film.lock().unwrap_or_else(|poisoned| poisoned.into_inner()));
+        patch.paint(&mut locked(&film));
         progress.tile_done(tiles.len() as u64);
     };
     let tally = if options.is_adaptive() {

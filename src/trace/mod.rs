@@ -103,13 +103,13 @@ impl Engines for f32 {
             &Generic::<f32x8, true>("packet8", PhantomData),
             &Generic::<f32x16, true>("packet16", PhantomData),
             &stream::Stream::<f32x16>(PhantomData),
-            &tile::Tile::<true>,
-            &tile::Tile::<false>,
+            &tile::Tile::EXACT,
+            &tile::Tile::LARGE,
         ]
     }
 
     fn variants() -> &'static [&'static dyn Engine<Self>] {
-        &[&tile::SmallTile(1), &tile::SmallTile(4)]
+        &[&tile::Tile::SMALL, &tile::Tile::MEDIUM]
     }
 
     fn memory(scratch: &mut Scratch) -> &mut Memory<Self> {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::camera::{Camera, PixelRect, SubPixel, Tiling, fill_tile, morton_decode};
-use crate::error::{Error, Result, by_name};
+use crate::error::{Error, Result, by_name, locked};
 use crate::film::heat;
 use crate::ray::{Counters, Hits, Rays};
 use crate::render::{Progress, RenderOptions, RenderOutput};
@@ -85,7 +85,7 @@ pub(super) fn render<S: Engines>(
         }
         let found = memory.tile(map, engine, world, (camera, &tiling, rect), tile);
         let (x0, y0) = tiling.origin(tile);
-        let values = &mut *values.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let values = &mut *locked(&values);
         for (i, value) in memory.values.iter().enumerate() {
             let (dx, dy) = morton_decode(i as u32);
             if let Some(index) = window.index(x0 + dx, y0 + dy) {

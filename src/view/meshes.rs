@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::SystemTime;
 
-use crate::error::Result;
+use crate::error::{Result, locked};
 use crate::scene::kdl::meshes::MeshFile;
 use crate::scene::load::read_mesh;
 use crate::scene::reference::References;
@@ -40,7 +40,7 @@ impl Meshes {
     pub fn read(&self, path: &Path, references: &References<'_>) -> Result<MeshFile> {
         let meta = std::fs::metadata(path);
         let stamp = meta.and_then(|meta| Ok((meta.modified()?, meta.len()))).ok();
-        let mut known = self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut known = locked(&self.0);
         if let (Some(stamp), Some(then)) = (stamp, known.get(path))
             && stamp == then.stamp
             && (then.file.looks.digests.is_empty() || then.others.is_some() && then.others == others(references))

@@ -5,13 +5,13 @@
 
 use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use notify::{Event, EventKind, RecommendedWatcher, RecursiveMode, Watcher};
 
 use super::stage::Stage;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, locked};
 use crate::scene::parameter::Parameter;
 
 /// A save is over when nothing happened for so long: editors write in several steps.
@@ -104,10 +104,6 @@ impl Source {
     pub fn is_watched(&self) -> bool {
         self.watcher.is_some()
     }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
 fn watch(file: &Path, sender: Sender<Instant>) -> Result<RecommendedWatcher> {

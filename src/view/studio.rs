@@ -12,7 +12,7 @@ use super::action::{Action, View};
 use super::reload::Source;
 use super::script::{Line, Step};
 use super::stage::Stage;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, locked};
 use crate::film::{Film, Window};
 use crate::render::progressive::{self, Framebuffer, Viewer};
 use crate::render::{Progress, RenderOutput};
@@ -62,7 +62,7 @@ impl Viewer for Clock {
     fn painted(&self, _: &Framebuffer, _: Window) {}
     fn step_done(&self, _: &Framebuffer, _: progressive::Step) {
         if !self.has_first.swap(true, Ordering::Relaxed) {
-            let mut first = self.first.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let mut first = locked(&self.first);
             *first = Some(self.start.elapsed().as_secs_f64());
         }
     }

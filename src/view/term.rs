@@ -10,6 +10,7 @@ use crossterm::style::{Color, Colors, Print, ResetColor, SetColors};
 use crossterm::terminal::{Clear, ClearType};
 use crossterm::{QueueableCommand, terminal};
 
+use crate::error::locked;
 use crate::film::{Film, Window, srgb};
 use crate::render::progressive::{Framebuffer, Step, Viewer};
 
@@ -54,14 +55,14 @@ impl<W: Write + Send> Terminal<W> {
 
     /// One more of `total` batches is done: for the bar under the picture.
     pub fn batch_done(&self, total: u64) {
-        let mut state = self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut state = locked(&self.state);
         state.steps_done += 1;
         state.total = total;
     }
 
     /// Draws the finished picture; the bar goes, and the cursor stays below.
     pub fn finish(&self, film: &Film) {
-        let mut state = self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut state = locked(&self.state);
         self.draw(&mut state, film, |x, y| film.window.index(x, y), false);
     }
 

@@ -31,7 +31,7 @@ use super::pixels::{add, mean};
 use super::scheduler::RenderOutput;
 use super::tally::Tally;
 use crate::camera::{Camera, PixelRect, Tiling, fill_pixels, fill_tile, morton_decode};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, locked};
 use crate::film::Window;
 use crate::lanes::Real;
 use crate::ray::Rays;
@@ -337,8 +337,4 @@ fn stop(watch: Watch<'_>, stopped: &AtomicBool) -> bool {
     let stop = watch.progress.stopped();
     stopped.fetch_or(stop, Ordering::Relaxed);
     stop
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }

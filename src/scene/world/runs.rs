@@ -80,12 +80,14 @@ impl Runs {
         self.list[self.find(prim)]
     }
 
-    /// The place of primitive `prim`, a shape or a leaf of solids, in the object's space, if it is kept.
+    /// The same, and of a shape or a leaf of solids its place in the object's space, if that is kept.
     #[inline]
-    pub fn place(&self, prim: u32) -> Option<&Place> {
-        self.places.get(self.find(prim))?.as_ref()
+    pub fn placed(&self, prim: u32) -> (Run, Option<&Place>) {
+        let at = self.find(prim);
+        (self.list[at], self.places.get(at).and_then(Option::as_ref))
     }
 
+    #[inline]
     fn find(&self, prim: u32) -> usize {
         let cell = (prim >> self.shift) as usize;
         let (low, high) = (self.starts[cell] as usize, self.starts[cell + 1] as usize);

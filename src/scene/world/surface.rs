@@ -51,17 +51,13 @@ impl<S: Real> World<S> {
     /// `org`, `dir`: the ray in world space; `t`, `u`, `v`, `prim`, `inst`: a hit of an engine of this world.
     pub fn surface(&self, org: DVec3, dir: DVec3, t: f64, u: f64, v: f64, prim: u32, inst: u32) -> Surface<'_> {
         let placement = &self.assembly.placements[inst as usize];
-        let runs = &self.runs[placement.object as usize];
-        let run = runs.of(prim);
+        let (run, kept) = self.runs[placement.object as usize].placed(prim);
         let part = &self.assembly.objects[placement.object as usize].parts[run.part as usize];
         let material = run.material;
         let stands = self.instances[inst as usize].identity;
         let is_plain = stands && part.to_object == DAffine3::IDENTITY;
-        // Of an instance that stays where its object is, places are known.
-        let place = |map: &dyn Fn() -> DAffine3| match runs.place(prim) {
-            Some(known) if stands => *known,
-            _ => Place::new(&map()),
-        };
+        // In an instance that stays where its object is, places in the object are places in the world.
+        let kept = kept.filter(|_| stands);
         let to_world = if is_plain { DAffine3::IDENTITY } else { placement.to_world * part.to_object };
         let spread = |local: DVec3| through(&placement.to_world, through(&part.to_object, local));
         match &part.kind {
@@ -83,7 +79,7 @@ impl<S: Real> World<S> {
             }
             PartKind::Shape(shape) => {
                 let position = org + dir * t;
-                let place = place(&|| to_world);
+                let place = kept.copied().unwrap_or_else(|| Place::new(&to_world));
                 let ng = place.normal(solids::shape_normal(shape, place.local(position), u as u32));
                 Surface { position, ng, ns: ng, magnitude: spread(DVec3::ONE), material, triangle: None }
             }
@@ -93,7 +89,7 @@ impl<S: Real> World<S> {
                 let (lo, hi) = leaf.solid.bounds();
                 let size = lo.abs().max(hi.abs());
                 let magnitude = spread(through(&leaf.to_tree, if size.is_finite() { size } else { DVec3::ONE }));
-                let place = place(&|| to_world * leaf.to_tree);
+                let place = kept.copied().unwrap_or_else(|| Place::new(&(to_world * leaf.to_tree)));
                 let outward = place.normal(solids::solid_normal(&leaf.solid, place.local(position), u as u32));
                 let ng = if v > 0.5 { -outward } else { outward };
                 Surface { position, ng, ns: ng, magnitude, material, triangle: None }

@@ -67,11 +67,25 @@ pub struct Memory {
 
 /// The engine; `EXACT`: with the hits of the common formula.
 #[derive(Clone, Copy, Debug)]
-pub struct Tile<const EXACT: bool>;
+pub struct Tile<const EXACT: bool> {
+    name: &'static str,
+    /// Most groups in a tile.
+    most: usize,
+}
 
-/// `tile` with fewer groups at most in one tile: 4 (8x8 rays) or 1 (4x4 rays), to see what the size is worth.
-#[derive(Clone, Copy, Debug)]
-pub struct SmallTile(pub usize);
+impl Tile<true> {
+    /// 16x16 rays with the scalar engine's bits.
+    pub const EXACT: Self = Self { name: "tile-exact", most: GROUPS };
+}
+
+impl Tile<false> {
+    /// 16x16 rays.
+    pub const LARGE: Self = Self { name: "tile", most: GROUPS };
+    /// 8x8 rays, to see what the size is worth.
+    pub const MEDIUM: Self = Self { name: "tile-8x8", most: 4 };
+    /// 4x4 rays, the same.
+    pub const SMALL: Self = Self { name: "tile-4x4", most: 1 };
+}
 
 /// One call of the engine.
 struct Job<'a> {
@@ -236,11 +250,11 @@ impl Job<'_> {
 
 impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
     fn name(&self) -> &'static str {
-        if EXACT { "tile-exact" } else { "tile" }
+        self.name
     }
 
     fn lanes(&self) -> usize {
-        BLOCK
+        self.most * V::N
     }
 
     fn is_exact(&self) -> bool {
@@ -256,7 +270,7 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
         counters: Option<&mut Counters>,
     ) {
         hits.prepare(rays.len());
-        call::<false, EXACT>(world, rays, Output::Closest(hits), scratch, counters, GROUPS);
+        call::<false, EXACT>(world, rays, Output::Closest(hits), scratch, counters, self.most);
     }
 
     fn occluded(
@@ -269,46 +283,7 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
     ) {
         out.clear();
         out.resize(rays.len(), 0);
-        call::<true, EXACT>(world, rays, Output::Any(out), scratch, counters, GROUPS);
-    }
-}
-
-impl Engine<f32> for SmallTile {
-    fn name(&self) -> &'static str {
-        if self.0 == 1 { "tile-4x4" } else { "tile-8x8" }
-    }
-
-    fn lanes(&self) -> usize {
-        self.0 * V::N
-    }
-
-    fn is_exact(&self) -> bool {
-        false
-    }
-
-    fn intersect(
-        &self,
-        world: &World<f32>,
-        rays: &Rays<f32>,
-        hits: &mut Hits<f32>,
-        scratch: &mut Scratch,
-        counters: Option<&mut Counters>,
-    ) {
-        hits.prepare(rays.len());
-        call::<false, false>(world, rays, Output::Closest(hits), scratch, counters, self.0);
-    }
-
-    fn occluded(
-        &self,
-        world: &World<f32>,
-        rays: &Rays<f32>,
-        out: &mut Vec<u8>,
-        scratch: &mut Scratch,
-        counters: Option<&mut Counters>,
-    ) {
-        out.clear();
-        out.resize(rays.len(), 0);
-        call::<true, false>(world, rays, Output::Any(out), scratch, counters, self.0);
+        call::<true, EXACT>(world, rays, Output::Any(out), scratch, counters, self.most);
     }
 }
 

@@ -9,6 +9,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use crate::error::locked;
 use crate::film::{Film, PlaneData, Window};
 use crate::render::progressive::{Framebuffer, Viewer};
 use packet::{create_image, update_image};
@@ -73,7 +74,7 @@ impl Tev {
 
     /// Hands a packet to the thread that writes, or remembers its part for later.
     fn send(&self, packet: Vec<u8>, part: Window) {
-        let mut state = self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut state = locked(&self.state);
         let Some(packets) = &state.packets else { return };
         match packets.try_send(packet) {
             Ok(()) => {}
@@ -98,7 +99,7 @@ impl Tev {
     /// What the system says, if the viewer went away before it was told everything or does not read any more.
     pub fn finish(self, film: &Film) -> io::Result<()> {
         let (packets, writer, missed) = {
-            let mut state = self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let mut state = locked(&self.state);
             (state.packets.take(), state.writer.take(), std::mem::take(&mut state.missed))
         };
         if let Some(packets) = packets {

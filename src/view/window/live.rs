@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -14,6 +14,7 @@ use winit::window::WindowId;
 
 use super::screen::Screen;
 use super::surface::Surface;
+use crate::error::locked;
 use crate::film::{Film, Window};
 use crate::render::progressive::{Framebuffer, Step, Viewer};
 use crate::view::levels::Levels;
@@ -109,10 +110,6 @@ impl Viewer for Live {
     fn step_done(&self, frame: &Framebuffer, _: Step) {
         self.show(frame.film(), |x, y| frame.shown(x, y));
     }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
 struct App {

@@ -19,7 +19,7 @@ use winit::window::WindowId;
 use super::action::Action;
 use super::reload::Source;
 use super::studio::{Save, Studio};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, locked};
 use input::{HELP, Pointer, Request};
 use screen::{LINE, Screen};
 use surface::Surface;
@@ -76,7 +76,7 @@ pub fn open(studio: Studio<'_>, pool: &rayon::ThreadPool, name: &str) -> Result<
 
 /// Opens the scene anew whenever its files change or a slider moves; an error is shown while the last good scene stays.
 fn watch(studio: &Studio<'_>, shared: &Shared, pool: &rayon::ThreadPool, message: &std::sync::Mutex<Option<String>>) {
-    let tell = |what: Option<String>| *message.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = what;
+    let tell = |what: Option<String>| *locked(message) = what;
     while !shared.is_quitting() {
         if studio.source.wait(Instant::now() + WATCH, studio.stopped).is_none() {
             continue;
@@ -120,7 +120,7 @@ struct App<'a> {
 
 impl App<'_> {
     fn say(&self, what: Option<String>) {
-        *self.message.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = what;
+        *locked(self.message) = what;
     }
 
     fn redraw(&self) {
@@ -247,7 +247,7 @@ impl App<'_> {
                 view.exposure,
             )
         });
-        let message = self.message.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).clone();
+        let message = locked(self.message).clone();
         let mut lines: Vec<&str> = message.iter().flat_map(|text| text.lines()).take(8).collect();
         lines.push(&status);
         let top = screen.height.saturating_sub(LINE * lines.len() as u32);

@@ -4,10 +4,11 @@
 //! got no further, and the next one starts. Once nothing changes the frame goes on until it is finished.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::sync::{Arc, Condvar, Mutex};
 use std::time::{Duration, Instant};
 
 use super::screen::Screen;
+use crate::error::locked;
 use crate::film::{Film, Window};
 use crate::render::progressive::{Framebuffer, Step, Viewer};
 use crate::render::{Progress, RenderOutput};
@@ -136,10 +137,6 @@ impl Shared {
         shown.mrays_per_s = output.rays.total() as f64 / output.seconds.max(f64::MIN_POSITIVE) / 1e6;
         shown.error = None;
     }
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
 /// One picture in the making.
