@@ -70,7 +70,7 @@ fn differences(world: &Scene, rays: &Rays<f32>) -> (usize, usize) {
     let (want, any_want) = (Answers::Closest(vec![want]), Answers::Any(vec![any_want]));
     explained(world, rays, &want, Answers::Closest(vec![got.clone()]));
     explained(world, rays, &any_want, Answers::Any(vec![any.clone()]));
-    for small in ["tile-8x8", "tile-4x4"] {
+    for small in ["tile-16x16", "tile-8x8", "tile-4x4"] {
         find(small).intersect(world, rays, &mut got, &mut scratch, None);
         find(small).occluded(world, rays, &mut any, &mut scratch, None);
         admitted(world, rays, &want, &Answers::Closest(vec![got.clone()]));
@@ -220,6 +220,34 @@ fn rays_aimed_at_free_edges() {
         doubtful += 512;
     }
     println!("{doubtful} rays along free edges, all bits equal");
+}
+
+/// An edge that points at the eye is short to look at and long to compute with: its function rounds by more than is seen
+/// of it.
+#[test]
+fn ribbons_whose_ends_point_at_the_eye() {
+    let (eye, mut r) = (DVec3::new(0.25, 1.6, 0.6), Random(31));
+    for _ in 0..60 {
+        let (mut mesh, mut targets) = (Mesh::default(), Vec::new());
+        let middle = (DVec3::new(-0.52, -0.07, -0.87) + r.in_cube() * 0.2).normalize();
+        for i in 0..16 {
+            let way = (middle + r.in_cube() * 0.02).normalize();
+            let (start, long) = (eye + way * (0.4 + 0.4 * r.unit()), r.in_cube().normalize() * 7.7e-3);
+            let end = start + (way + r.in_cube() * 0.02).normalize() * 2.3e-4;
+            let corners = [start, end, start + long, end + long];
+            mesh.positions.extend(corners.map(|p| p.as_vec3().as_dvec3()));
+            mesh.triangles.extend([[4 * i, 4 * i + 1, 4 * i + 2], [4 * i + 1, 4 * i + 3, 4 * i + 2]]);
+            for _ in 0..64 {
+                targets.push(start.lerp(end, r.unit()) + long * (0.02 * (r.unit() - 0.5)));
+            }
+        }
+        let world = compile(vec![mesh]);
+        let mut rays = Rays::new(targets.len());
+        for (i, target) in targets.into_iter().enumerate() {
+            rays.set(i, eye.as_vec3().to_array(), (target - eye).as_vec3().to_array(), 0.0, f32::INFINITY);
+        }
+        assert_eq!(differences(&world, &rays), (0, 0));
+    }
 }
 
 #[test]

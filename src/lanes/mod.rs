@@ -166,6 +166,19 @@ pub fn dot<V: Lanes>(a: Lanes3<V>, b: Lanes3<V>) -> V {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
 }
 
+/// `f` of 0, 1 and 2: axes or corners. Written out, because `[0, 1, 2].map(f)` becomes a call in large kernels.
+#[inline(always)]
+pub fn each<T>(mut f: impl FnMut(usize) -> T) -> [T; 3] {
+    [f(0), f(1), f(2)]
+}
+
+/// `f` of all three of `list`, written out as in [`each`].
+#[inline(always)]
+pub fn map3<A, B>(list: [A; 3], mut f: impl FnMut(A) -> B) -> [B; 3] {
+    let [x, y, z] = list;
+    [f(x), f(y), f(z)]
+}
+
 /// A reciprocal that is always finite: components below the smallest normal number count as that number.
 /// With it `(bound - org) * rcp` can overflow to infinity but never gives NaN for finite input.
 #[inline(always)]

@@ -13,6 +13,12 @@ pub fn twice(v: f32x8) -> f32x16 {
     f32x16::new([a, b, c, d, e, f, g, h, a, b, c, d, e, f, g, h])
 }
 
+/// The lower and the upper half.
+#[inline(always)]
+pub fn halves(v: f32x16) -> [f32x8; 2] {
+    bytemuck::cast(v.to_array())
+}
+
 /// The sign bits, bit `i` for lane `i`; also of zeros and NaNs.
 #[inline(always)]
 pub fn signs(v: f32x16) -> u32 {
@@ -105,7 +111,7 @@ pub fn upper_halves(v: f32x8, wanted: u32) -> [u16; 8] {
 /// The least lane. No NaNs.
 #[inline(always)]
 pub fn least(v: f32x16) -> f32 {
-    let [a, b]: [f32x8; 2] = bytemuck::cast(v.to_array());
+    let [a, b] = halves(v);
     let [a, b]: [f32x4; 2] = bytemuck::cast(a.fast_min(b).to_array());
     let [x, y, z, w] = a.fast_min(b).to_array();
     let lesser = |x: f32, y: f32| if x < y { x } else { y };
@@ -147,29 +153,29 @@ fn row_minima_portable(rows: &[f32x16; 16]) -> f32x16 {
     }))
 }
 
-/// Writes the positions of the set bits of a 16-bit mask to the front of `list`, ascending; what follows them is
-/// unspecified. Returns how many there are.
+/// Writes the positions of the set bits of a 16-bit mask, counted from `base` on, to the front of `list`, ascending; what
+/// follows them is unspecified. Returns how many there are. `base` is at most 240.
 #[inline(always)]
-pub fn list_bits(mask: u32, list: &mut [u8; 16]) -> usize {
+pub fn list_bits(mask: u32, base: u8, list: &mut [u8; 16]) -> usize {
     #[cfg(all(target_feature = "avx512vbmi2", target_feature = "avx512vl"))]
     {
         use std::arch::x86_64::{__m128i, _mm_maskz_compress_epi8};
         const POSITIONS: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-        let all = bytemuck::cast::<[u8; 16], __m128i>(POSITIONS);
+        let all = bytemuck::cast::<[u8; 16], __m128i>(POSITIONS.map(|i| i + base));
         // SAFETY: compiled only where the whole build has VBMI2 and VL; the instruction touches registers only.
         *list = bytemuck::cast(unsafe { _mm_maskz_compress_epi8(mask as u16, all) });
         (mask & 0xffff).count_ones() as usize
     }
     #[cfg(not(all(target_feature = "avx512vbmi2", target_feature = "avx512vl")))]
-    list_bits_portable(mask, list)
+    list_bits_portable(mask, base, list)
 }
 
 #[cfg(any(test, not(all(target_feature = "avx512vbmi2", target_feature = "avx512vl"))))]
-fn list_bits_portable(mask: u32, list: &mut [u8; 16]) -> usize {
+fn list_bits_portable(mask: u32, base: u8, list: &mut [u8; 16]) -> usize {
     let mut rest = mask & 0xffff;
     let mut count = 0;
     while rest != 0 {
-        list[count] = rest.trailing_zeros() as u8;
+        list[count] = base + rest.trailing_zeros() as u8;
         rest &= rest - 1;
         count += 1;
     }
@@ -318,10 +324,11 @@ mod tests {
     #[test]
     fn set_bits_are_listed_in_order() {
         for mask in (0..0x1_0000u32).step_by(7).chain([0xffff, 0x8000]) {
-            let want: Vec<u8> = (0..16).filter(|i| mask >> i & 1 != 0).collect();
+            let base = mask as u8 % 241;
+            let want: Vec<u8> = (0..16).filter(|i| mask >> i & 1 != 0).map(|i| base + i).collect();
             for list_bits in [list_bits, list_bits_portable] {
                 let mut list = [0xff; 16];
-                let count = list_bits(mask, &mut list);
+                let count = list_bits(mask, base, &mut list);
                 assert_eq!(list[..count], want);
             }
         }

@@ -11,8 +11,9 @@ use crate::ray::Hits;
 /// Largest relative difference of t between two answers that are the same.
 pub const TOLERANCE: f64 = 1e-4;
 
-/// Largest share of rays that may differ in a row that gets a figure.
-pub const MAX_DIFFERING: f64 = 1e-5;
+/// Largest share of rays that may differ in a peer's row that gets a figure; the row says how many do. Peers that are
+/// not watertight and take a ray's own surface at t = 0 for a hit differ in 2 to 3 rays of 10^5 on voxels and on hair.
+pub const MAX_DIFFERING: f64 = 1e-4;
 
 /// How a peer's answers compare with ours.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -115,8 +116,8 @@ mod tests {
     }
 
     #[test]
-    fn one_ray_in_a_hundred_thousand_may_differ() {
-        let at = |differences| Agreement { rays: 200_000, differences, ..Default::default() };
+    fn one_ray_in_ten_thousand_may_differ() {
+        let at = |differences| Agreement { rays: 20_000, differences, ..Default::default() };
         assert!(at(0).passes() && at(2).passes() && !at(3).passes());
     }
 

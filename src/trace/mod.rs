@@ -104,12 +104,12 @@ impl Engines for f32 {
             &Generic::<f32x16, true>("packet16", PhantomData),
             &stream::Stream::<f32x16>(PhantomData),
             &tile::Tile::EXACT,
-            &tile::Tile::LARGE,
+            &tile::Tile::LARGEST,
         ]
     }
 
     fn variants() -> &'static [&'static dyn Engine<Self>] {
-        &[&tile::Tile::SMALL, &tile::Tile::MEDIUM]
+        &[&tile::Tile::SMALL, &tile::Tile::MEDIUM, &tile::Tile::LARGE]
     }
 
     fn memory(scratch: &mut Scratch) -> &mut Memory<Self> {

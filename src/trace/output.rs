@@ -1,5 +1,6 @@
 //! Where an engine's answers go.
 
+use crate::lanes::words::prefetch;
 use crate::lanes::{Lanes, Real};
 use crate::ray::{HitPacket, Hits};
 
@@ -29,10 +30,26 @@ impl<S: Real> Output<'_, S> {
         }
     }
 
+    /// Asks the memory for the place of the answer of ray `first` and its neighbours.
+    #[inline(always)]
+    pub fn prefetch(&self, first: usize) {
+        if let Self::Closest(hits) = self {
+            [&hits.t, &hits.u, &hits.v].into_iter().for_each(|array| prefetch(array, first));
+            [&hits.prim, &hits.inst].into_iter().for_each(|array| prefetch(array, first));
+        }
+    }
+
     /// Writes what `n` rays from `first` on found.
     #[inline(always)]
     pub fn put_any(&mut self, first: usize, n: usize, done: u32) {
         if let Self::Any(out) = self {
+            if n == 16
+                && let Some(out) = out[first..].first_chunk_mut::<16>()
+            {
+                // A whole vector at once.
+                *out = std::array::from_fn(|lane| (done >> lane & 1) as u8);
+                return;
+            }
             for (lane, out) in out[first..].iter_mut().take(n).enumerate() {
                 *out = (done >> lane & 1) as u8;
             }

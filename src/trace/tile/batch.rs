@@ -18,9 +18,9 @@
 //! that differ by more than the factor 1 + `rho` have the same order. What lies between is given to the common
 //! formula, ray by ray ([`super::exact`]). So a tile's answers are those of the scalar engine, bit by bit.
 
-use super::groups::Groups;
+use super::groups::{Groups, splats};
 use super::{HALF_ULP, V, select};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::shape::Block;
 
 /// Triangles set up together.
@@ -57,7 +57,7 @@ pub struct Batch {
     /// Primitive number; `EXACT`: block * 8 + place.
     pub id: [u32; BATCH + 8],
     /// Groups that met the leaf.
-    pub groups: [u32; BATCH + 8],
+    pub groups: [u64; BATCH + 8],
     len: usize,
 }
 
@@ -87,6 +87,10 @@ pub struct Planes {
     pub farthest: [f32; BATCH],
     /// Own answers: what was added to the edge functions.
     pub eps: [[f32; BATCH]; 3],
+    /// Own answers: beyond this, an edge function (with what was added to it) is surely positive.
+    pub doubt: [f32; BATCH],
+    /// Own answers: least and greatest s and t of the corners, and a little more.
+    pub rect: [[[f32; BATCH]; 2]; 2],
     /// Any-hit: the first corner and the normal that points away from the apex, in the axes of the geometry and
     /// the scale of the frame.
     pub side: [[f32; BATCH]; 6],
@@ -115,7 +119,7 @@ impl Batch {
 
     /// Adds the first `count` triangles of a block; there must be room.
     #[inline(always)]
-    pub fn push<const EXACT: bool>(&mut self, block: &Block<f32, 9>, first_slot: u32, count: usize, groups: u32) {
+    pub fn push<const EXACT: bool>(&mut self, block: &Block<f32, 9>, first_slot: u32, count: usize, groups: u64) {
         let at = self.len.min(BATCH);
         for (to, from) in self.corners.iter_mut().zip(&block.fields) {
             to[at..at + 8].copy_from_slice(from);
@@ -134,15 +138,14 @@ impl Batch {
     /// Sets up what waits. Returns the triangles that may be seen from the tile.
     #[inline(always)]
     pub fn set_up<const ANY: bool, const EXACT: bool>(&self, groups: &Groups, planes: &mut Planes) -> u32 {
-        let apex = groups.frame.apex.map(V::splat);
-        let p: [Lanes3<V>; 3] = [0, 1, 2].map(|i| {
-            let corner = [0, 1, 2].map(|a| V::load(&self.corners[3 * i + a]) - apex[a]);
+        let apex = map3(groups.frame.apex, V::splat);
+        let p: [Lanes3<V>; 3] = each(|i| {
+            let corner = each(|a| V::load(&self.corners[3 * i + a]) - apex[a]);
             groups.frame.coordinates(corner)
         });
         let (d1, d2) = (minus(p[1], p[0]), minus(p[2], p[0]));
         if !EXACT {
-            let sides = [sum(minus(d2, d1)), sum(d2), sum(d1)];
-            return self.set_up_own::<ANY>(groups, planes, &p, cross_accurate(d1, d2), sides);
+            return self.set_up_own::<ANY>(groups, planes, &p, cross_accurate(d1, d2));
         }
         let normal = cross(d1, d2);
         let volume = dot(normal, p[0]);
@@ -156,10 +159,10 @@ impl Batch {
         let back = volume.cmp_lt(zero);
         let pick = |x: V, wild: V| select(tame, x, wild);
         let faced = |x: V| pick(select(back, -x, x), zero);
-        let [x, y, z] = normal.map(|n| n * rcp);
+        let [x, y, z] = map3(normal, |n| n * rcp);
         let inverse = [pick(x, zero), pick(y, zero), pick(z, V::splat(f32::MAX))];
         let edges = [cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])];
-        let linear = [edges[0].map(faced), edges[1].map(faced), edges[2].map(faced), inverse];
+        let linear = [map3(edges[0], faced), map3(edges[1], faced), map3(edges[2], faced), inverse];
         let most = pick(one + rho, one);
         (-eps).store(&mut planes.outside);
         pick(eps, V::splat(f32::INFINITY)).store(&mut planes.inside);
@@ -176,7 +179,6 @@ impl Batch {
         planes: &mut Planes,
         p: &[Lanes3<V>; 3],
         normal: Lanes3<V>,
-        sides: [V; 3],
     ) -> u32 {
         let volume = dot(normal, p[0]);
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
@@ -185,13 +187,13 @@ impl Batch {
         let faced = |x: V| select(back, -x, x);
         if ANY {
             let scale = V::splat(groups.frame.scale);
-            let corner = [0, 1, 2].map(|i| [0, 1, 2].map(|a| V::load(&self.corners[3 * i + a]) * scale));
-            let away = cross_accurate(minus(corner[1], corner[0]), minus(corner[2], corner[0])).map(faced);
+            let corner = each(|i| each(|a| V::load(&self.corners[3 * i + a]) * scale));
+            let away = map3(cross_accurate(minus(corner[1], corner[0]), minus(corner[2], corner[0])), faced);
             let side = corner[0].into_iter().chain(away);
             planes.side.iter_mut().zip(side).for_each(|(to, x)| x.store(to));
         }
         let (edges, eps) = own_edges(groups, p);
-        let edges = edges.map(|e| e.map(faced));
+        let edges = map3(edges, |e| map3(e, faced));
         // A corner beside or behind the apex sets no bound to what is nearest.
         let low = p[0][2].fast_min(p[1][2]).fast_min(p[2][2]);
         let high = p[0][2].fast_max(p[1][2]).fast_max(p[2][2]);
@@ -204,9 +206,23 @@ impl Batch {
         let size = volume.abs();
         let mut steady = zero.cmp_lt(high);
         for k in 0..3 {
-            let near = eps[k].cmp_le(sides[k] * most) | eps[k].cmp_lt(groups.smallest(&edges[k]));
+            // The edge's length as it is seen: its function's slope is that times the depth. An edge that is seen end-on
+            // moves far.
+            let seen = edges[k][0].abs().fast_max(edges[k][1].abs());
+            let near = (eps[k] * high).cmp_le(seen * most) | eps[k].cmp_lt(groups.smallest(&edges[k]));
             steady = steady & near & (eps[k] * high * V::splat(LEAST_SUM)).cmp_le(size);
         }
+        // Edges that are nearly parallel, moved by their errors, meet far from the corner between them: what lies there is
+        // beyond all corners.
+        let (in_view, most) = (zero.cmp_lt(low), most / low);
+        for axis in 0..2 {
+            let [a, b, c] = each(|i| p[i][axis] / p[i][2]);
+            let (least, greatest) = (a.fast_min(b).fast_min(c) - most, a.fast_max(b).fast_max(c) + most);
+            select(in_view, least, V::splat(-f32::MAX)).store(&mut planes.rect[axis][0]);
+            select(in_view, greatest, V::splat(f32::MAX)).store(&mut planes.rect[axis][1]);
+        }
+        let doubt = eps[0].fast_max(eps[1]).fast_max(eps[2]);
+        (doubt + doubt).store(&mut planes.doubt);
         let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
         planes.wild = in_front & !V::splat(LEAST_VOLUME).cmp_le(size).bits();
         planes.unsteady = in_front & !steady.bits();
@@ -214,10 +230,10 @@ impl Batch {
             planes.corners = p.map(|q| q.map(V::to_array));
         }
         // With its rounding error added, an edge function is positive wherever the exact one is.
-        let [e0, e1, e2] = [0, 1, 2].map(|k| [edges[k][0], edges[k][1], edges[k][2] + eps[k]]);
+        let [e0, e1, e2] = each(|k| [edges[k][0], edges[k][1], edges[k][2] + eps[k]]);
         planes.eps.iter_mut().zip(eps).for_each(|(to, x)| x.store(to));
         let own = |inverse: V| nearest.fast_min(farthest.fast_max(inverse));
-        planes.store(groups, &[e0, e1, e2, normal.map(|n| n * rcp)], zero, own) & in_front | planes.wild
+        planes.store(groups, &[e0, e1, e2, map3(normal, |n| n * rcp)], zero, own) & in_front | planes.wild
     }
 }
 
@@ -227,11 +243,11 @@ impl Planes {
     #[inline(always)]
     fn store(&mut self, groups: &Groups, linear: &[Lanes3<V>; 4], eps: V, bound: impl Fn(V) -> V) -> u32 {
         let zero = V::constant(0.0);
-        let [[s0, s1], [t0, t1]] = groups.bounds.map(|b| b.map(V::splat));
+        let [[s0, s1], [t0, t1]] = splats(&groups.bounds);
         let mut seen = V::splat(f32::INFINITY);
         for (k, f) in linear.iter().enumerate() {
             let negative = [f[0].cmp_lt(zero), f[1].cmp_lt(zero)];
-            self.negative[k] = negative.map(LaneMask::bits);
+            self.negative[k] = [negative[0].bits(), negative[1].bits()];
             let (s, t) = (select(negative[0], s0, s1), select(negative[1], t0, t1));
             let value = f[0].mul_add(s, f[1].mul_add(t, f[2]));
             let margin = if k < 3 { value + eps } else { bound(value) - V::splat(groups.nearest) };
@@ -265,7 +281,7 @@ fn doubt(groups: &Groups, p: &[Lanes3<V>; 3], length: V, area: V, rcp: V) -> (V,
 #[inline(always)]
 fn rounding(groups: &Groups, p: &[Lanes3<V>; 3]) -> V {
     let wide = V::splat(groups.wide);
-    let spread = p.map(|q| wide.mul_add(q[2].abs(), q[0].abs().fast_max(q[1].abs())));
+    let spread = map3(*p, |q| wide.mul_add(q[2].abs(), q[0].abs().fast_max(q[1].abs())));
     let spread = spread[0].fast_max(spread[1]).fast_max(spread[2]);
     spread * spread * V::splat(PRODUCTS) + V::splat(f32::MIN_POSITIVE)
 }
@@ -279,18 +295,18 @@ fn own_edges(groups: &Groups, p: &[Lanes3<V>; 3]) -> ([Lanes3<V>; 3], [V; 3]) {
     let zero = V::constant(0.0);
     let z0 = p[0][2];
     let near_ray = |axis: usize| {
-        let [lo, hi] = groups.bounds[axis].map(V::splat);
+        let [lo, hi] = [V::splat(groups.bounds[axis][0]), V::splat(groups.bounds[axis][1])];
         lo.fast_max(hi.fast_min(select(zero.cmp_lt(z0), p[0][axis] / z0, zero)))
     };
     let (s0, t0) = (near_ray(0), near_ray(1));
-    let seen = p.map(|q| [(-s0).mul_add(q[2], q[0]), (-t0).mul_add(q[2], q[1]), q[2]]);
-    let reach = seen.map(|q| q[0].abs().fast_max(q[1].abs()));
+    let seen = map3(*p, |q| [(-s0).mul_add(q[2], q[0]), (-t0).mul_add(q[2], q[1]), q[2]]);
+    let reach = map3(seen, |q| q[0].abs().fast_max(q[1].abs()));
     let pairs = [(1, 2), (2, 0), (0, 1)];
-    let edges = pairs.map(|(i, j)| {
+    let edges = map3(pairs, |(i, j)| {
         let [x, y, at_ray] = cross(seen[i], seen[j]);
         [x, y, (-x).mul_add(s0, (-y).mul_add(t0, at_ray))]
     });
-    let eps = pairs.map(|(i, j)| {
+    let eps = map3(pairs, |(i, j)| {
         let slope = reach[i] * p[j][2].abs() + reach[j] * p[i][2].abs();
         let products = reach[i] * reach[j] * V::splat(OWN_PRODUCTS[1]) + V::splat(f32::MIN_POSITIVE);
         slope.mul_add(V::splat(OWN_PRODUCTS[0] * groups.wide), products)

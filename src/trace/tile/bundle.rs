@@ -1,12 +1,15 @@
 //! What the rays of a block have in common: the point they start from, or (any-hit) the point they end in.
 
-use super::{BLOCK, GROUPS, HALF_ULP, Mask, V, select};
+use super::{GROUPS, HALF_ULP, Mask, SET, V, select};
 use crate::lanes::words::prefetch;
-use crate::lanes::{LaneMask, Lanes, Lanes3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
 use crate::ray::{Packet, Rays};
 
 /// Directions and coordinates the tile's arithmetic is made for. Rays outside are left to the packet kernel.
 const TAME: (f32, f32) = (1e-15, 1e15);
+
+/// Groups between the one that is read (or written) and the one the memory is asked for.
+pub const AHEAD: usize = 8;
 
 /// Where rays go from and to, seen from the point they share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +42,9 @@ pub struct Bundle<'a> {
     pub slack: f32,
     /// Start or end.
     pub shared: Shared,
-    /// Per group of 16 rays: lanes that are traced from the apex.
+    /// Groups of 16 rays.
+    pub len: usize,
+    /// Per group: lanes that are traced from the apex.
     pub tame: [u32; GROUPS],
     /// Lanes that are live, but for the packet kernel.
     pub odd: [u32; GROUPS],
@@ -51,57 +56,76 @@ pub fn load3(arrays: &[Vec<f32>; 3], at: usize) -> Lanes3<V> {
     [V::load(&arrays[0][at..]), V::load(&arrays[1][at..]), V::load(&arrays[2][at..])]
 }
 
-/// Number of groups of 16 in the block that starts with ray `first`.
+/// Number of groups of 16 in the `N` sets that start with ray `first`.
 #[inline(always)]
-pub fn groups(rays: &Rays<f32>, first: usize) -> usize {
-    (rays.padded_len() - first).min(BLOCK) / V::N
+pub fn groups<const N: usize>(rays: &Rays<f32>, first: usize) -> usize {
+    (rays.padded_len() - first).min(N * SET * V::N) / V::N
 }
 
-/// Asks the memory for the block that starts with ray `first`.
+/// Asks the memory for the group of rays that starts with ray `first`.
 #[inline(always)]
 pub fn prefetch_rays(rays: &Rays<f32>, first: usize) {
     let [x, y, z] = &rays.org;
     let [dx, dy, dz] = &rays.dir;
     for array in [x, y, z, dx, dy, dz, &rays.t_min, &rays.t_max] {
-        (first..first + BLOCK).step_by(V::N).for_each(|i| prefetch(array, i));
+        prefetch(array, first);
     }
 }
 
 impl<'a> Bundle<'a> {
-    /// Looks at a block of rays; `None` if they have no point in common. `any`: a common end will do.
+    /// Looks at `N` sets of rays; `None` if they have no point in common. `any`: a common end will do.
     #[inline(always)]
-    pub fn find(rays: &'a Rays<f32>, first: usize, any: bool) -> Option<Self> {
+    pub fn find<const N: usize>(rays: &'a Rays<f32>, first: usize, any: bool) -> Option<Self> {
         let mut bundle = Self {
             rays,
             first,
             apex: [0.0; 3],
             slack: 0.0,
             shared: Shared::Start,
+            len: groups::<N>(rays, first),
             tame: [0; GROUPS],
             odd: [0; GROUPS],
         };
-        bundle.sort_lanes();
-        let leader = (0..GROUPS).find(|&g| bundle.tame[g] != 0)?;
-        let leader = first + leader * V::N + bundle.tame[leader].trailing_zeros() as usize;
-        bundle.apex = rays.org(leader);
-        if bundle.starts_in_apex() {
-            return Some(bundle);
-        }
-        if !any {
+        // Most rays without a common point show it within the first group.
+        let len = std::mem::replace(&mut bundle.len, 1);
+        bundle.sort_lanes(0);
+        if bundle.tame[0] != 0 && !bundle.share(any) {
             return None;
         }
-        for at in [At::One, At::Limit] {
-            if let Some((apex, slack)) = bundle.common_end(at, leader) {
-                (bundle.apex, bundle.slack, bundle.shared) = (apex, slack, Shared::End(at));
-                return Some(bundle);
-            }
+        bundle.len = len;
+        bundle.sort_lanes(1);
+        bundle.share(any).then_some(bundle)
+    }
+
+    /// Finds the common point of the groups; whether there is one.
+    #[inline(always)]
+    fn share(&mut self, any: bool) -> bool {
+        let Some(leader) = (0..self.len).find(|&g| self.tame[g] != 0) else { return false };
+        let leader = self.first + leader * V::N + self.tame[leader].trailing_zeros() as usize;
+        self.apex = self.rays.org(leader);
+        if self.starts_in_apex() {
+            return true;
         }
-        None
+        let ends = if any { [At::One, At::Limit].as_slice() } else { &[] };
+        let end = ends.iter().find_map(|&at| Some((self.common_end(at, leader)?, at)));
+        let Some(((apex, slack), at)) = end else { return false };
+        (self.apex, self.slack, self.shared) = (apex, slack, Shared::End(at));
+        true
     }
 
     /// Groups with a lane that is traced from the apex.
-    pub fn groups(&self) -> u32 {
-        (0..GROUPS).fold(0, |mask, g| mask | u32::from(self.tame[g] != 0) << g)
+    pub fn groups(&self) -> u64 {
+        (0..self.len).fold(0, |mask, g| mask | u64::from(self.tame[g] != 0) << g)
+    }
+
+    /// The rays of set `q` as a bundle of their own.
+    pub fn set(&self, q: usize) -> Self {
+        let at = q * SET;
+        let (mut tame, mut odd) = ([0; GROUPS], [0; GROUPS]);
+        tame[..SET].copy_from_slice(&self.tame[at..at + SET]);
+        odd[..SET].copy_from_slice(&self.odd[at..at + SET]);
+        let len = self.len.saturating_sub(at).min(SET);
+        Self { first: self.first + at * V::N, len, tame, odd, ..*self }
     }
 
     /// Where the segments of a group start.
@@ -110,16 +134,17 @@ impl<'a> Bundle<'a> {
         let at = self.first + g * V::N;
         let (org, dir) = (load3(&self.rays.org, at), load3(&self.rays.dir, at));
         let t_min = V::load(&self.rays.t_min[at..]);
-        [0, 1, 2].map(|a| t_min.mul_add(dir[a], org[a]))
+        each(|a| t_min.mul_add(dir[a], org[a]))
     }
 
     #[inline(always)]
-    fn sort_lanes(&mut self) {
+    fn sort_lanes(&mut self, from: usize) {
         let (least, most) = (V::splat(TAME.0), V::splat(TAME.1));
         let size = |v: Lanes3<V>| v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs());
         let finite = |v: Lanes3<V>| v[0].abs().cmp_le(most) & v[1].abs().cmp_le(most) & v[2].abs().cmp_le(most);
-        for g in 0..groups(self.rays, self.first) {
+        for g in from..self.len {
             let at = self.first + g * V::N;
+            prefetch_rays(self.rays, at + AHEAD * V::N);
             let (org, dir) = (load3(&self.rays.org, at), load3(&self.rays.dir, at));
             let (t_min, t_max) = (V::load(&self.rays.t_min[at..]), V::load(&self.rays.t_max[at..]));
             let tame = finite(org)
@@ -136,8 +161,8 @@ impl<'a> Bundle<'a> {
 
     #[inline(always)]
     fn starts_in_apex(&self) -> bool {
-        let apex = self.apex.map(V::splat);
-        (0..groups(self.rays, self.first)).all(|g| {
+        let apex = map3(self.apex, V::splat);
+        (0..self.len).all(|g| {
             let org = load3(&self.rays.org, self.first + g * V::N);
             let same = org[0].cmp_eq(apex[0]) & org[1].cmp_eq(apex[1]) & org[2].cmp_eq(apex[2]);
             self.tame[g] & !same.bits() == 0
@@ -152,9 +177,9 @@ impl<'a> Bundle<'a> {
             At::Limit => self.rays.t_max[leader],
         };
         let (org, dir) = (self.rays.org(leader), self.rays.dir(leader));
-        let apex = [0, 1, 2].map(|a| dir[a] * parameter + org[a]);
+        let apex = each(|a| dir[a] * parameter + org[a]);
         let (mut apart, mut size, mut fits) = (V::constant(0.0), V::constant(0.0), true);
-        for g in 0..groups(self.rays, self.first) {
+        for g in 0..self.len {
             let first = self.first + g * V::N;
             let (org, dir) = (load3(&self.rays.org, first), load3(&self.rays.dir, first));
             let t_max = V::load(&self.rays.t_max[first..]);
@@ -165,7 +190,7 @@ impl<'a> Bundle<'a> {
             fits &= self.tame[g] & !usable.bits() == 0;
             let lanes = Mask::from_bits(self.tame[g]);
             // Differences first: the sum would hide what it rounds away.
-            let miss = [0, 1, 2].map(|a| dir[a].mul_add(t, org[a] - V::splat(apex[a])).abs());
+            let miss = each(|a| dir[a].mul_add(t, org[a] - V::splat(apex[a])).abs());
             let largest = org[0].abs().fast_max(org[1].abs()).fast_max(org[2].abs());
             apart = select(lanes, miss[0] + miss[1] + miss[2], apart).fast_max(apart);
             size = select(lanes, largest, size).fast_max(size);

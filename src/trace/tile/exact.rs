@@ -5,7 +5,7 @@ use super::bundle::Bundle;
 use super::groups::{Groups, NO_SLOT, bounded, merge};
 use super::{Mask, V, select};
 use crate::lanes::words::positions;
-use crate::lanes::{LaneMask, Lanes};
+use crate::lanes::{LaneMask, Lanes, each};
 use crate::ray::{Candidate, HitPacket, INVALID_ID, Packet};
 use crate::scene::world::Object;
 use crate::shape::Triangle;
@@ -44,7 +44,7 @@ impl Exact<'_> {
     /// The final hits of a group: what the common formula says of its winners.
     #[inline(always)]
     pub fn finish(&self, groups: &Groups, g: usize, packet: &Packet<V>, t_max: V) -> Final {
-        let slots = &groups.slot[g];
+        let slots = &groups.of[g].slot;
         let none = V::splat(f32::from_bits(INVALID_ID));
         let zero = V::constant(0.0);
         let (mut t, mut u, mut v, mut prims) = (t_max, zero, zero, none);
@@ -84,10 +84,10 @@ pub fn certain_pair<const ANY: bool>(
     i: usize,
     slot: u32,
 ) -> (u32, u32) {
-    let (s, t) = (groups.s[g], groups.t[g]);
-    let (inv_lo, inv_hi) = (groups.inv_lo[g], groups.inv_hi[g]);
+    let (s, t) = (groups.of[g].s, groups.of[g].t);
+    let (inv_lo, inv_hi) = (groups.of[g].inv_lo, groups.of[g].inv_hi);
     let value = |k: usize| {
-        let [x, y, z] = [0, 1, 2].map(|x| V::splat(planes.linear[k][x][i]));
+        let [x, y, z] = each(|x| V::splat(planes.linear[k][x][i]));
         x.mul_add(s, y.mul_add(t, z))
     };
     let edge = value(0).fast_min(value(1)).fast_min(value(2));
@@ -97,12 +97,12 @@ pub fn certain_pair<const ANY: bool>(
     let certain =
         possible & V::splat(planes.inside[i]).cmp_le(edge) & inv_hi.cmp_lt(lo) & hi.cmp_lt(V::splat(groups.cap));
     if ANY {
-        groups.inv_lo[g] = select(certain, V::splat(f32::INFINITY), inv_lo);
-        groups.done[g] |= certain.bits();
+        groups.of[g].inv_lo = select(certain, V::splat(f32::INFINITY), inv_lo);
+        groups.of[g].done |= certain.bits();
     } else {
-        groups.inv_lo[g] = select(certain, lo, inv_lo);
-        groups.inv_hi[g] = select(certain, hi, inv_hi);
-        groups.slot[g] = merge(certain, slot, groups.slot[g]);
+        groups.of[g].inv_lo = select(certain, lo, inv_lo);
+        groups.of[g].inv_hi = select(certain, hi, inv_hi);
+        groups.of[g].slot = merge(certain, slot, groups.of[g].slot);
     }
     (certain.bits(), possible.bits() & !certain.bits())
 }
@@ -121,9 +121,9 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slo
         hits |= hit;
     });
     if ANY {
-        groups.done[g] |= hits;
+        groups.of[g].done |= hits;
         let done = Mask::from_bits(hits);
-        groups.inv_lo[g] = select(done, V::splat(f32::INFINITY), groups.inv_lo[g]);
+        groups.of[g].inv_lo = select(done, V::splat(f32::INFINITY), groups.of[g].inv_lo);
         return;
     }
     if hits == 0 {
@@ -131,10 +131,10 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slo
     }
     let prim = exact.prim(slot);
     let mut wins = hits;
-    let mut rest = hits & !positions(&groups.slot[g], NO_SLOT);
+    let mut rest = hits & !positions(&groups.of[g].slot, NO_SLOT);
     while rest != 0 {
-        let old = groups.slot[g][rest.trailing_zeros() as usize & 15];
-        let same = rest & positions(&groups.slot[g], old);
+        let old = groups.of[g].slot[rest.trailing_zeros() as usize & 15];
+        let same = rest & positions(&groups.of[g].slot, old);
         rest &= !same;
         exact.meet(&packet, old, same, |found, lanes, old_prim| {
             let nearer = t.cmp_lt(found.t).bits();
@@ -143,14 +143,14 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slo
         });
     }
     // From here on the depth is known as well as the common formula knows it.
-    let inverse = V::constant(1.0) / (t * groups.speed[g]);
+    let inverse = V::constant(1.0) / (t * groups.of[g].speed);
     let loose = groups.loose();
     let mask = Mask::from_bits(wins);
-    groups.inv_lo[g] = select(mask, bounded(inverse) * V::splat(1.0 - loose), groups.inv_lo[g]);
-    groups.inv_hi[g] = select(mask, inverse * V::splat(1.0 + loose), groups.inv_hi[g]);
+    groups.of[g].inv_lo = select(mask, bounded(inverse) * V::splat(1.0 - loose), groups.of[g].inv_lo);
+    groups.of[g].inv_hi = select(mask, inverse * V::splat(1.0 + loose), groups.of[g].inv_hi);
     for lane in 0..V::N {
         if wins >> lane & 1 != 0 {
-            groups.slot[g][lane] = slot;
+            groups.of[g].slot[lane] = slot;
         }
     }
 }

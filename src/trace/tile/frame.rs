@@ -5,8 +5,8 @@
 //! the same map, so only the rounding of the map matters, not how perpendicular its axes are.
 
 use super::bundle::{Bundle, Shared};
-use super::{GROUPS, Mask, V, select};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot};
+use super::{Mask, SET, V, select};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, map3};
 use crate::math::Aabb;
 
 /// Scales of scenes the tile's arithmetic is made for: products of three coordinates, scaled, stay normal numbers.
@@ -29,7 +29,7 @@ impl Frame {
     /// The frame of some groups of a bundle that looks at geometry within `bounds`; `None` if the scale is out of
     /// range or the directions cancel.
     #[inline(always)]
-    pub fn of(bundle: &Bundle, groups: u32, bounds: &Aabb<f32>) -> Option<Self> {
+    pub fn of<const N: usize>(bundle: &Bundle, groups: u64, bounds: &Aabb<f32>) -> Option<Self> {
         let apex = bundle.apex;
         let reach = |a: usize| (bounds.lo[a] - apex[a]).abs().max((bounds.hi[a] - apex[a]).abs());
         let extent = reach(0).max(reach(1)).max(reach(2));
@@ -38,7 +38,7 @@ impl Frame {
             return None;
         }
         let scale = f32::from_bits(((127 - exponent) as u32) << 23);
-        let (sum, across) = Self::mean_direction(bundle, groups);
+        let (sum, across) = Self::mean_direction::<N>(bundle, groups);
         let a = normalised(sum)?;
         let flat = |r: [f64; 3]| sub(r, a.map(|x| x * dot(r, a)));
         // One direction, or directions on a line through the apex: any perpendicular axis does.
@@ -55,15 +55,15 @@ impl Frame {
     /// The order of rays in a block (Morton) says what is left; where it is another order, nothing but the fit of
     /// the rectangles gets worse.
     #[inline(always)]
-    fn mean_direction(bundle: &Bundle, groups: u32) -> ([f64; 3], [f64; 3]) {
-        let mut sample: Lanes3<[f32; GROUPS]> = Default::default();
-        // One group alone is sampled whole, else each group by its first lane.
+    fn mean_direction<const N: usize>(bundle: &Bundle, groups: u64) -> ([f64; 3], [f64; 3]) {
+        let mut sample: Lanes3<[f32; SET]> = Default::default();
+        // One group alone is sampled whole, else every `N`th group by its first lane.
         let single = groups.is_power_of_two().then(|| groups.trailing_zeros() as usize);
         let mut used = 0;
-        for i in 0..GROUPS {
+        for i in 0..SET {
             let (g, lane) = match single {
                 Some(g) => (g, i),
-                None => (i, (bundle.tame[i].trailing_zeros() as usize).min(V::N - 1)),
+                None => (N * i, (bundle.tame[N * i].trailing_zeros() as usize).min(V::N - 1)),
             };
             if groups >> g & 1 == 0 || bundle.tame[g] >> lane & 1 == 0 {
                 continue;
@@ -77,17 +77,17 @@ impl Frame {
                 };
             }
         }
-        let sample = sample.map(V::new);
+        let sample = map3(sample, V::new);
         let length = dot(sample, sample).sqrt();
         let used = Mask::from_bits(used) & V::constant(0.0).cmp_lt(length);
         let scale = select(used, V::constant(1.0) / length, V::constant(0.0));
-        // Number i of a block of 256 has its third and of a quarter its first bit of x at i & 4 and i & 1.
+        // Number i of sixteen parts of a block has its second bit of x, of a quarter its first one, at i & 4 and i & 1.
         let quarter = groups & (groups - 1) != 0 && (0..4).any(|q| groups & !(0xf << (4 * q)) == 0);
         let bit = if quarter { 1 } else { 4 };
-        let unit = sample.map(|x| select(used, x * scale, V::constant(0.0)).to_array());
+        let unit = map3(sample, |x| select(used, x * scale, V::constant(0.0)).to_array());
         let mut sums = ([0.0f64; 3], [0.0f64; 3]);
         for axis in 0..3 {
-            for i in 0..GROUPS {
+            for i in 0..SET {
                 let x = f64::from(unit[axis][i]);
                 sums.0[axis] += x;
                 sums.1[axis] += if i & bit == 0 { -x } else { x };
@@ -99,7 +99,7 @@ impl Frame {
     /// Vectors in this frame.
     #[inline(always)]
     pub fn coordinates(&self, d: Lanes3<V>) -> Lanes3<V> {
-        self.axes.map(|axis| dot(d, axis.map(V::splat)))
+        map3(self.axes, |axis| dot(d, map3(axis, V::splat)))
     }
 }
 

@@ -1,10 +1,10 @@
-//! The rays of a tile: 16 groups of 16 (4x4 pixels), each ray as (s, t), its depth as 1/z between two bounds.
+//! The rays of a tile: up to 64 groups of 16 (4x4 pixels), each ray as (s, t), its depth as 1/z between two bounds.
 
 use super::bundle::{At, Bundle, Shared, load3};
 use super::frame::Frame;
-use super::{GROUPS, HALF_ULP, Mask, V, select};
+use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::words::{least, row_minima};
-use crate::lanes::{LaneMask, Lanes, Lanes3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
 use crate::math::Aabb;
 
 /// Widest tile: |s| and |t| below this (83 degrees off the axis).
@@ -13,39 +13,65 @@ const WIDEST: f32 = 8.0;
 /// "No triangle yet".
 pub const NO_SLOT: u32 = u32::MAX;
 
-/// The state of a tile. Depths are 1/z: 0 is infinitely far, infinite is a lane that wants nothing any more.
+/// The rays of one group and what they found. Depths are 1/z: 0 is infinitely far, infinite is a lane that wants nothing
+/// any more. One group's numbers lie together, so that what a pair of triangle and group needs is a few lines in a row.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub struct Group {
+    /// First ray coordinate.
+    pub s: V,
+    /// Second ray coordinate.
+    pub t: V,
+    /// The best hit (or the end of the segment) is surely not farther than this. Own answers: it is there.
+    pub inv_lo: V,
+    /// The best hit is surely not nearer than this. Own answers: no hit may be nearer than this, the segment's start.
+    pub inv_hi: V,
+    /// Triangle of the best hit, as [`super::batch::Batch::id`] has it, or [`NO_SLOT`].
+    pub slot: [u32; 16],
+    /// Own answers: edge functions of the best hit, those of the second and third corner and the sum of all.
+    pub weights: [V; 3],
+    /// Rays with a common end: where their segments start, in the axes of the geometry and
+    /// the scale of the frame.
+    pub start: Lanes3<V>,
+    /// Depth per unit of the ray's parameter.
+    pub speed: V,
+    /// Lanes that found something (any-hit).
+    pub done: u32,
+}
+
+impl Default for Group {
+    fn default() -> Self {
+        let zero = V::splat(0.0);
+        Self {
+            s: zero,
+            t: zero,
+            inv_lo: zero,
+            inv_hi: zero,
+            slot: [NO_SLOT; 16],
+            weights: [zero; 3],
+            start: [zero; 3],
+            speed: zero,
+            done: 0,
+        }
+    }
+}
+
+/// The state of a tile.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub struct Groups {
-    /// First ray coordinate by group.
-    pub s: [V; GROUPS],
-    /// Second ray coordinate.
-    pub t: [V; GROUPS],
-    /// The best hit (or the end of the segment) is surely not farther than this. Own answers: it is there.
-    pub inv_lo: [V; GROUPS],
-    /// The best hit is surely not nearer than this. Own answers: no hit may be nearer than this, the segment's start.
-    pub inv_hi: [V; GROUPS],
-    /// Triangle of the best hit, as [`super::batch::Batch::id`] has it, or [`NO_SLOT`].
-    pub slot: [[u32; 16]; GROUPS],
-    /// Own answers: edge functions of the best hit, those of the second and third corner and the sum of all.
-    pub weights: [[V; 3]; GROUPS],
-    /// Rays with a common end: where their segments start, in the axes of the geometry and
-    /// the scale of the frame.
-    pub start: [Lanes3<V>; GROUPS],
+    /// The groups.
+    pub of: [Group; GROUPS],
     /// Some segment ends before the common point.
     pub ends_early: bool,
-    /// Depth per unit of the ray's parameter.
-    pub speed: [V; GROUPS],
-    /// Lanes that found something (any-hit).
-    pub done: [u32; GROUPS],
-    /// Per group, as lanes: least and greatest s, least and greatest t.
-    pub rect: [[V; 2]; 2],
+    /// Per group, sixteen in the lanes of a vector: least and greatest s, least and greatest t.
+    pub rect: [[[V; SETS]; 2]; 2],
     /// The same as fractions of the tile's rectangle.
-    pub part: [[V; 2]; 2],
+    pub part: [[[V; SETS]; 2]; 2],
     /// Per group: least [`Groups::inv_lo`].
-    pub least: V,
+    pub least: [V; SETS],
     /// Per group: farthest depth that is still of interest; minus infinity for none.
-    pub far: V,
+    pub far: [V; SETS],
     /// Farthest of all groups.
     pub farthest: f32,
     /// Least [`Groups::inv_lo`] of all: a triangle that is farther everywhere is of no interest.
@@ -64,22 +90,14 @@ pub struct Groups {
 
 impl Default for Groups {
     fn default() -> Self {
-        let zero = [V::splat(0.0); GROUPS];
+        let zero = [V::splat(0.0); SETS];
         Self {
-            s: zero,
-            t: zero,
-            inv_lo: zero,
-            inv_hi: zero,
-            slot: [[NO_SLOT; 16]; GROUPS],
-            weights: [[zero[0]; 3]; GROUPS],
-            start: [[zero[0]; 3]; GROUPS],
+            of: [Group::default(); GROUPS],
             ends_early: false,
-            speed: zero,
-            done: [0; GROUPS],
-            rect: [[zero[0]; 2]; 2],
-            part: [[zero[0]; 2]; 2],
-            least: zero[0],
-            far: zero[0],
+            rect: [[zero; 2]; 2],
+            part: [[zero; 2]; 2],
+            least: zero,
+            far: zero,
             farthest: 0.0,
             nearest: 0.0,
             bounds: [[0.0; 2]; 2],
@@ -108,66 +126,83 @@ struct Lines {
 }
 
 impl Groups {
-    /// Takes in some groups of a bundle. False if they spread too wide for one frame (nothing is traced then).
+    /// Takes in some groups of the first `N` sets of a bundle. False if they spread too wide for one frame (nothing is
+    /// traced then).
     #[inline(always)]
-    pub fn load<const EXACT: bool>(&mut self, bundle: &Bundle, groups: u32, scene: &Aabb<f32>) -> bool {
-        let Some(frame) = Frame::of(bundle, groups, scene) else { return false };
+    pub fn load<const N: usize, const EXACT: bool>(&mut self, bundle: &Bundle, groups: u64, scene: &Aabb<f32>) -> bool {
+        let Some(frame) = Frame::of::<N>(bundle, groups, scene) else { return false };
         self.frame = frame;
         let most = V::splat(f32::INFINITY);
-        let mut lows = [[most; GROUPS]; 2];
-        // Greatest values as least negatives: one kind of shuffle tree does both.
-        let mut highs = [[most; GROUPS]; 2];
         let (mut near, mut reach) = (most, V::splat(0.0));
-        for g in 0..GROUPS {
-            self.slot[g] = [NO_SLOT; 16];
-            self.done[g] = 0;
-            if groups >> g & 1 == 0 || bundle.tame[g] == 0 {
-                (self.inv_lo[g], self.inv_hi[g]) = (most, most);
-                continue;
+        for q in 0..N {
+            let mut lows = [[most; SET]; 2];
+            // Greatest values as least negatives: one kind of shuffle tree does both.
+            let mut highs = [[most; SET]; 2];
+            for i in 0..SET {
+                let g = q * SET + i;
+                self.of[g].slot = [NO_SLOT; 16];
+                self.of[g].done = 0;
+                if groups >> g & 1 == 0 || bundle.tame[g] == 0 {
+                    (self.of[g].inv_lo, self.of[g].inv_hi) = (most, most);
+                    continue;
+                }
+                let lines = self.lines(bundle, g);
+                let tame = bundle.tame[g];
+                if tame & !lines.fit != 0 {
+                    return false;
+                }
+                let lanes = Mask::from_bits(tame);
+                (self.of[g].s, self.of[g].t, self.of[g].speed) = (lines.s, lines.t, lines.speed);
+                if bundle.shared != Shared::Start {
+                    self.of[g].start = map3(bundle.starts(g), |x| x * V::splat(self.frame.scale));
+                }
+                lows[0][i] = select(lanes, lines.s, most);
+                lows[1][i] = select(lanes, lines.t, most);
+                highs[0][i] = select(lanes, -lines.s, most);
+                highs[1][i] = select(lanes, -lines.t, most);
+                near = select(lanes, lines.near, most).fast_min(near);
+                reach = select(lanes, lines.reach, reach).fast_max(reach);
+                self.of[g].inv_lo = select(lanes, bounded(lines.far), most);
+                self.of[g].inv_hi = select(lanes, if EXACT { lines.far } else { lines.near }, most);
             }
-            let lines = self.lines(bundle, g);
-            let tame = bundle.tame[g];
-            if tame & !lines.fit != 0 {
-                return false;
+            for axis in 0..2 {
+                self.rect[axis][0][q] = row_minima(&lows[axis]);
+                self.rect[axis][1][q] = -row_minima(&highs[axis]);
             }
-            let lanes = Mask::from_bits(tame);
-            (self.s[g], self.t[g], self.speed[g]) = (lines.s, lines.t, lines.speed);
-            if bundle.shared != Shared::Start {
-                self.start[g] = bundle.starts(g).map(|x| x * V::splat(self.frame.scale));
-            }
-            lows[0][g] = select(lanes, lines.s, most);
-            lows[1][g] = select(lanes, lines.t, most);
-            highs[0][g] = select(lanes, -lines.s, most);
-            highs[1][g] = select(lanes, -lines.t, most);
-            near = select(lanes, lines.near, most).fast_min(near);
-            reach = select(lanes, lines.reach, reach).fast_max(reach);
-            self.inv_lo[g] = select(lanes, bounded(lines.far), most);
-            self.inv_hi[g] = select(lanes, if EXACT { lines.far } else { lines.near }, most);
         }
-        self.rect = [0, 1].map(|axis| [row_minima(&lows[axis]), -row_minima(&highs[axis])]);
-        self.bounds = self.rect.map(|r| [least(r[0]), greatest(r[1])]);
+        self.bounds = [0, 1].map(|axis| {
+            let [lo, hi] = &self.rect[axis];
+            [
+                (0..N).fold(f32::INFINITY, |m, q| m.min(least(lo[q]))),
+                (0..N).fold(f32::NEG_INFINITY, |m, q| m.max(greatest(hi[q]))),
+            ]
+        });
         self.wide = self.bounds.iter().flatten().fold(0.0, |w, x| x.abs().max(w));
-        self.part = [0, 1].map(|axis| {
+        for axis in 0..2 {
             let [lo, hi] = self.bounds[axis];
             let scale = V::splat(if hi > lo { 1.0 / (hi - lo) } else { 0.0 });
-            self.rect[axis].map(|edge| (edge - V::splat(lo)) * scale)
-        });
+            for side in 0..2 {
+                for q in 0..N {
+                    self.part[axis][side][q] = (self.rect[axis][side][q] - V::splat(lo)) * scale;
+                }
+            }
+        }
         self.ends_early = least(near) < f32::INFINITY;
         self.slack = (bundle.slack + 8.0 * HALF_ULP * greatest(reach)) * self.frame.scale;
         if EXACT || bundle.shared != Shared::Start {
-            self.loosen(near);
+            self.loosen::<N>(near);
         }
-        self.refresh();
+        self.refresh::<N>(u32::MAX);
         true
     }
 
     /// The ends of the segments, moved apart by what rounding may have done to them.
     #[inline(always)]
-    fn loosen(&mut self, near: V) {
+    fn loosen<const N: usize>(&mut self, near: V) {
         let loose = self.loose();
-        for g in 0..GROUPS {
-            self.inv_lo[g] *= V::splat(1.0 - loose);
-            self.inv_hi[g] *= V::splat(1.0 + loose);
+        for g in 0..N * SET {
+            self.of[g].inv_lo *= V::splat(1.0 - loose);
+            self.of[g].inv_hi *= V::splat(1.0 + loose);
         }
         self.cap = least(near) * (1.0 - loose);
     }
@@ -187,7 +222,7 @@ impl Groups {
             Shared::Start => load3(&bundle.rays.dir, at),
             Shared::End(_) => {
                 let org = load3(&bundle.rays.org, at);
-                [0, 1, 2].map(|a| org[a] - V::splat(bundle.apex[a]))
+                each(|a| org[a] - V::splat(bundle.apex[a]))
             }
         };
         let [x, y, speed] = self.frame.coordinates(direction);
@@ -218,23 +253,36 @@ impl Groups {
     #[inline(always)]
     pub fn smallest(&self, f: &Lanes3<V>) -> V {
         let zero = V::constant(0.0);
-        let [[s0, s1], [t0, t1]] = self.bounds.map(|b| b.map(V::splat));
+        let [[s0, s1], [t0, t1]] = splats(&self.bounds);
         let (s, t) = (select(f[0].cmp_lt(zero), s1, s0), select(f[1].cmp_lt(zero), t1, t0));
         f[0].mul_add(s, f[1].mul_add(t, f[2]))
     }
 
-    /// Brings the per-group depths up to date.
+    /// Brings the per-group depths of `sets` (bit by set) up to date.
     #[inline(always)]
-    pub fn refresh(&mut self) {
-        let none = V::splat(f32::NEG_INFINITY);
-        self.least = row_minima(&self.inv_lo);
-        let waiting = self.least.cmp_lt(V::splat(f32::INFINITY));
-        // A little farther than the reciprocal, whatever its rounding.
-        let far = V::splat(1.0 + 4.0 * HALF_ULP) / self.least;
-        self.far = select(waiting, far, none);
-        self.farthest = greatest(self.far);
-        self.nearest = least(self.least);
+    pub fn refresh<const N: usize>(&mut self, sets: u32) {
+        for q in (0..N).filter(|q| N == 1 || sets >> q & 1 != 0) {
+            let mut rows = [V::splat(0.0); SET];
+            rows.iter_mut().zip(&self.of[q * SET..]).for_each(|(row, group)| *row = group.inv_lo);
+            self.least[q] = row_minima(&rows);
+            let waiting = self.least[q].cmp_lt(V::splat(f32::INFINITY));
+            // A little farther than the reciprocal, whatever its rounding.
+            let far = V::splat(1.0 + 4.0 * HALF_ULP) / self.least[q];
+            self.far[q] = select(waiting, far, V::splat(f32::NEG_INFINITY));
+        }
+        let (far, near) = (1..N).fold((self.far[0], self.least[0]), |(far, near), q| {
+            (far.fast_max(self.far[q]), near.fast_min(self.least[q]))
+        });
+        self.farthest = greatest(far);
+        self.nearest = least(near);
     }
+}
+
+/// The ends of two intervals in all lanes.
+#[inline(always)]
+pub fn splats(bounds: &[[f32; 2]; 2]) -> [[V; 2]; 2] {
+    let [[s0, s1], [t0, t1]] = *bounds;
+    [[V::splat(s0), V::splat(s1)], [V::splat(t0), V::splat(t1)]]
 }
 
 /// `new` where the mask is set. Numbers are moved as floats: selection copies bits.

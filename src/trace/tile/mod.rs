@@ -1,4 +1,4 @@
-//! Tiles: 256 rays with a common origin, or (any-hit) a common end, through the 8-wide tree together.
+//! Tiles: up to 1024 rays with a common origin, or (any-hit) a common end, through the 8-wide tree together.
 //!
 //! The speed comes from doing per tile what packets do per ray: one node test is eight boxes against the whole tile,
 //! triangles are set up once per tile, and a ray's share of a triangle test is four linear functions of its two
@@ -43,10 +43,16 @@ fn select(mask: Mask, if_true: V, if_false: V) -> V {
     <V as Lanes>::select(mask, if_true, if_false)
 }
 
-/// Groups in a tile.
-const GROUPS: usize = 16;
+/// Groups in a set: a vector holds one number for each of them. In ray files a set is 16x16 pixels.
+const SET: usize = V::N;
 
-/// Rays in a tile.
+/// Most sets in a tile.
+const SETS: usize = 4;
+
+/// Most groups in a tile.
+const GROUPS: usize = SETS * SET;
+
+/// Most rays in a tile.
 const BLOCK: usize = GROUPS * V::N;
 
 /// Half the distance from 1 to the next number: the largest relative error of one operation.
@@ -74,14 +80,16 @@ pub struct Tile<const EXACT: bool> {
 }
 
 impl Tile<true> {
-    /// 16x16 rays with the scalar engine's bits.
+    /// 32x32 rays with the scalar engine's bits.
     pub const EXACT: Self = Self { name: "tile-exact", most: GROUPS };
 }
 
 impl Tile<false> {
-    /// 16x16 rays.
-    pub const LARGE: Self = Self { name: "tile", most: GROUPS };
-    /// 8x8 rays, to see what the size is worth.
+    /// 32x32 rays.
+    pub const LARGEST: Self = Self { name: "tile", most: GROUPS };
+    /// 16x16 rays, to see what the size is worth.
+    pub const LARGE: Self = Self { name: "tile-16x16", most: SET };
+    /// 8x8 rays, the same.
     pub const MEDIUM: Self = Self { name: "tile-8x8", most: 4 };
     /// 4x4 rays, the same.
     pub const SMALL: Self = Self { name: "tile-4x4", most: 1 };
@@ -96,7 +104,7 @@ struct Job<'a> {
     stream: &'a mut stream::Memory<f32>,
     counters: &'a mut Counters,
     output: Output<'a, f32>,
-    /// Most groups in a tile: 16, 4 or 1.
+    /// Most groups in a tile: 64, 16, 4 or 1.
     most: usize,
 }
 
@@ -125,11 +133,21 @@ impl Job<'_> {
         // What one call learns must not change what another one answers.
         self.memory.slabs.forget();
         for first in (0..self.rays.len()).step_by(BLOCK) {
-            bundle::prefetch_rays(self.rays, first + BLOCK);
-            let bundle = object.and_then(|object| Some((object, Bundle::find(self.rays, first, ANY)?)));
-            match bundle {
-                Some((object, bundle)) => self.block::<ANY, EXACT, COUNT>(object, &bundle),
-                None => self.memory.rest.extend((0..bundle::groups(self.rays, first)).map(|g| first + g * V::N)),
+            let Some(object) = object else {
+                self.leave::<SETS>(first);
+                continue;
+            };
+            if self.most == GROUPS
+                && let Some(bundle) = Bundle::find::<SETS>(self.rays, first, ANY)
+            {
+                self.block::<ANY, EXACT, COUNT>(object, &bundle);
+                continue;
+            }
+            for first in (first..self.rays.len().min(first + BLOCK)).step_by(SET * V::N) {
+                match Bundle::find::<1>(self.rays, first, ANY) {
+                    Some(bundle) => self.block::<ANY, EXACT, COUNT>(object, &bundle),
+                    None => self.leave::<1>(first),
+                }
             }
         }
         if self.memory.rest.is_empty() {
@@ -143,44 +161,65 @@ impl Job<'_> {
         self.memory.rest.clear();
     }
 
-    /// Traces a block as one tile, or as four or sixteen where its rays spread too wide, or as packets.
+    /// Leaves `N` sets to the stream kernel.
+    fn leave<const N: usize>(&mut self, first: usize) {
+        self.memory.rest.extend((0..bundle::groups::<N>(self.rays, first)).map(|g| first + g * V::N));
+    }
+
+    /// Traces a block as one tile or as one for each set.
     fn block<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, object: &Object<f32>, bundle: &Bundle) {
         let all = bundle.groups();
-        for g in (0..bundle::groups(self.rays, bundle.first)).filter(|g| all >> g & 1 == 0) {
+        for g in (0..bundle.len).filter(|g| all >> g & 1 == 0) {
             self.packet::<ANY, COUNT>(bundle.first + g * V::N);
         }
-        if self.most == GROUPS && self.tile::<ANY, EXACT, COUNT>(object, bundle, all) {
+        if all >> SET != 0 && self.tile::<SETS, ANY, EXACT, COUNT>(object, bundle, all) {
+            return;
+        }
+        for q in (0..SETS).filter(|q| all >> (q * SET) & 0xffff != 0) {
+            self.set::<ANY, EXACT, COUNT>(object, &bundle.set(q), all >> (q * SET) & 0xffff);
+        }
+    }
+
+    /// Traces some groups of one set as one tile, or as four or sixteen where its rays spread too wide, or as packets.
+    fn set<const ANY: bool, const EXACT: bool, const COUNT: bool>(
+        &mut self,
+        object: &Object<f32>,
+        bundle: &Bundle,
+        all: u64,
+    ) {
+        if self.most >= SET && self.tile::<1, ANY, EXACT, COUNT>(object, bundle, all) {
             return;
         }
         for quarter in [0xf, 0xf0, 0xf00, 0xf000] {
-            if self.most > 1 && self.tile::<ANY, EXACT, COUNT>(object, bundle, all & quarter) {
+            if self.most > 1 && self.tile::<1, ANY, EXACT, COUNT>(object, bundle, all & quarter) {
                 continue;
             }
-            for g in (0..GROUPS).filter(|g| (all & quarter) >> g & 1 != 0) {
-                if !self.tile::<ANY, EXACT, COUNT>(object, bundle, 1 << g) {
+            for g in (0..SET).filter(|g| (all & quarter) >> g & 1 != 0) {
+                if !self.tile::<1, ANY, EXACT, COUNT>(object, bundle, 1 << g) {
                     self.packet::<ANY, COUNT>(bundle.first + g * V::N);
                 }
             }
         }
     }
 
-    /// Traces some groups as a tile, unless they spread too wide.
+    /// Traces some groups of the first `N` sets as a tile, unless they spread too wide.
     #[inline(always)]
-    fn tile<const ANY: bool, const EXACT: bool, const COUNT: bool>(
+    fn tile<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
         &mut self,
         object: &Object<f32>,
         bundle: &Bundle,
-        groups: u32,
+        groups: u64,
     ) -> bool {
         if groups == 0 {
             return true;
         }
-        if !self.memory.groups.load::<EXACT>(bundle, groups, &object.tree.bounds) {
+        if !self.memory.groups.load::<N, EXACT>(bundle, groups, &object.tree.bounds) {
             return false;
         }
         let exact = Exact { bundle, object };
-        walk::walk::<ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
-        for g in (0..GROUPS).filter(|g| groups >> g & 1 != 0) {
+        walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
+        for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
+            self.output.prefetch(bundle.first + (g + bundle::AHEAD) * V::N);
             self.finish::<ANY, EXACT, COUNT>(&exact, g);
         }
         true
@@ -195,7 +234,7 @@ impl Job<'_> {
             self.counters.rays += u64::from((exact.bundle.tame[g] | odd).count_ones());
         }
         if ANY {
-            let mut done = self.memory.groups.done[g];
+            let mut done = self.memory.groups.of[g].done;
             if odd != 0 {
                 done |= self.rest::<ANY, COUNT>(first, odd, None).1;
             }

@@ -1,5 +1,5 @@
 //! One node against a tile: eight boxes against both edges of the tile's rectangle at once, then one box against
-//! the sixteen groups.
+//! sixteen groups at a time.
 //!
 //! For a plane through the apex with normal n, a box with centre c and half size h has n.c + |n|.h as largest
 //! value. The four families of planes (left, right, below, above) are evaluated at both edges of the tile; the
@@ -8,10 +8,10 @@
 //! algorithm", 2005 (frusta over boxes); the interpolation is our own.
 
 use super::groups::Groups;
-use super::{HALF_ULP, V};
+use super::{HALF_ULP, SET, V};
 use crate::bvh::{Node, WIDTH};
-use crate::lanes::words::{signs, twice, upper_halves, without_key};
-use crate::lanes::{LaneMask, Lanes, f32x8};
+use crate::lanes::words::{halves, signs, twice, upper_halves, without_key};
+use crate::lanes::{LaneMask, Lanes, each, f32x8, map3};
 
 /// Half a vector: the eight children of a node.
 type Half = f32x8;
@@ -40,9 +40,10 @@ pub struct Planes {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Level {
-    /// Largest values of the left, right, lower and upper planes over each child's box: at the tile's low edge in
-    /// 0..8, at its high edge in 8..16.
-    edges: [[f32; 16]; 4],
+    /// Largest values of the left, right, lower and upper planes over each child's box, for planes at the tile's low edge.
+    low: [[f32; WIDTH]; 4],
+    /// What is to be added for planes at its high edge.
+    step: [[f32; WIDTH]; 4],
     /// Nearest depth of each child.
     near: [f32; WIDTH],
     /// Upper half of the nearest depth's bits, from 0 on; all ones for a child that is done or not wanted.
@@ -50,12 +51,19 @@ pub struct Level {
     /// The node.
     pub node: u32,
     /// Groups that met it.
-    pub groups: u32,
+    pub groups: u64,
 }
 
 impl Default for Level {
     fn default() -> Self {
-        Self { edges: [[0.0; 16]; 4], near: [0.0; WIDTH], keys: [u16::MAX; WIDTH], node: 0, groups: 0 }
+        Self {
+            low: [[0.0; WIDTH]; 4],
+            step: [[0.0; WIDTH]; 4],
+            near: [0.0; WIDTH],
+            keys: [u16::MAX; WIDTH],
+            node: 0,
+            groups: 0,
+        }
     }
 }
 
@@ -84,9 +92,9 @@ impl Planes {
         let unit = MARGIN * HALF_ULP * frame.extent;
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
         for (axis, across) in [u, v].into_iter().enumerate() {
-            let normal = groups.bounds[axis].map(|edge| [0, 1, 2].map(|x| across[x] - edge * a[x]));
-            planes.normal[axis] = [0, 1, 2].map(|x| both(0.5 * normal[0][x], 0.5 * normal[1][x]));
-            planes.size[axis] = planes.normal[axis].map(V::abs);
+            let normal = groups.bounds[axis].map(|edge| each(|x| across[x] - edge * a[x]));
+            planes.normal[axis] = each(|x| both(0.5 * normal[0][x], 0.5 * normal[1][x]));
+            planes.size[axis] = map3(planes.normal[axis], V::abs);
             // The tile's edges are rounded differences too: |edge| * |a| belongs to the plane's size.
             let [lo, hi] = normal.map(|n| unit * (sum(n) + sum(across) + groups.wide * sum(a)));
             planes.margin[axis] = both(lo, hi) + V::splat(groups.slack * (1.0 + groups.wide) * 2.0);
@@ -106,14 +114,14 @@ impl Planes {
             let hi = Half::new(node.bounds[a][1]) - origin;
             (sum[a], size[a]) = (hi + lo, hi - lo);
         }
-        let (sums, sizes) = (sum.map(twice), size.map(twice));
+        let (sums, sizes) = (map3(sum, twice), map3(size, twice));
         let middle = |n: &[V; 3]| n[0].mul_add(sums[0], n[1].mul_add(sums[1], n[2] * sums[2]));
         let radius = |n: &[V; 3], e: V| n[0].mul_add(sizes[0], n[1].mul_add(sizes[1], n[2].mul_add(sizes[2], e)));
         let (ms, rs) = (middle(&self.normal[0]), radius(&self.size[0], self.margin[0]));
         let (mt, rt) = (middle(&self.normal[1]), radius(&self.size[1], self.margin[1]));
         let (left, right, below, above) = (rs + ms, rs - ms, rt + mt, rt - mt);
-        let d = self.depth.map(Half::splat);
-        let e = self.depth_size.map(Half::splat);
+        let d = map3(self.depth, Half::splat);
+        let e = map3(self.depth_size, Half::splat);
         let mz = d[0].mul_add(sum[0], d[1].mul_add(sum[1], d[2] * sum[2]));
         let margin = Half::splat(self.depth_margin);
         let rz = e[0].mul_add(size[0], e[1].mul_add(size[1], e[2].mul_add(size[2], margin)));
@@ -124,10 +132,11 @@ impl Planes {
         if met == 0 {
             return 0;
         }
-        left.store(&mut level.edges[0]);
-        right.store(&mut level.edges[1]);
-        below.store(&mut level.edges[2]);
-        above.store(&mut level.edges[3]);
+        for (family, value) in [left, right, below, above].into_iter().enumerate() {
+            let [low, high] = halves(value);
+            low.store(&mut level.low[family]);
+            (high - low).store(&mut level.step[family]);
+        }
         let near = mz - rz;
         level.near = near.to_array();
         level.keys = upper_halves(near.fast_max(zero), met);
@@ -136,18 +145,23 @@ impl Planes {
 }
 
 impl Level {
-    /// Groups that meet the box of `child`, of those that met the node.
+    /// Groups that meet the box of `child`, of those that met the node; the tile has `N` sets.
     #[inline(always)]
-    pub fn groups_at(&self, child: usize, groups: &Groups) -> u32 {
-        let between = |family: usize, part: V| {
-            let (a, b) = (V::splat(self.edges[family][child]), V::splat(self.edges[family][child + 8]));
-            part.mul_add(b, a - part * a)
-        };
-        let [s, t] = &groups.part;
-        // The left planes lie at the groups' least s, the right planes at their greatest; so for t.
-        let least = between(0, s[0]).fast_min(between(1, s[1])).fast_min(between(2, t[0]).fast_min(between(3, t[1])));
-        let near = V::splat(self.near[child]).cmp_le(groups.far);
-        !signs(least) & near.bits() & self.groups
+    pub fn groups_at<const N: usize>(&self, child: usize, groups: &Groups) -> u64 {
+        let low = |family: usize| V::splat(self.low[family][child]);
+        let step = |family: usize| V::splat(self.step[family][child]);
+        let (low, step) = ([low(0), low(1), low(2), low(3)], [step(0), step(1), step(2), step(3)]);
+        let near = V::splat(self.near[child]);
+        let mut met = 0;
+        for q in 0..N {
+            let between = |family: usize, part: V| part.mul_add(step[family], low[family]);
+            // The left planes lie at the groups' least s, the right planes at their greatest; so for t.
+            let [[s0, s1], [t0, t1]] = &groups.part;
+            let least =
+                between(0, s0[q]).fast_min(between(1, s1[q])).fast_min(between(2, t0[q]).fast_min(between(3, t1[q])));
+            met |= u64::from(!signs(least) & near.cmp_le(groups.far[q]).bits()) << (q * SET);
+        }
+        met & self.groups
     }
 
     /// Takes a child off the list.

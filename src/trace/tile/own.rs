@@ -8,7 +8,7 @@ use super::exact::Exact;
 use super::groups::{Groups, NO_SLOT, merge};
 use super::{Mask, V, select};
 use crate::lanes::words::{below, positions};
-use crate::lanes::{LaneMask, Lanes};
+use crate::lanes::{LaneMask, Lanes, each};
 use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
 use crate::shape::{Block, Triangle};
 
@@ -23,19 +23,19 @@ pub fn own_depth(planes: &Planes, i: usize, inverse: V) -> V {
 pub fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usize, prim: u32) -> bool {
     let (inside, [e0, e1, e2]) = inside(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
-    let best = groups.inv_lo[g];
-    let inside = inside & inverse.cmp_le(groups.inv_hi[g]);
+    let best = groups.of[g].inv_lo;
+    let inside = inside & inverse.cmp_le(groups.of[g].inv_hi);
     if ANY {
         return occlude(groups, g, inside & best.cmp_le(inverse));
     }
-    let tie = best.cmp_eq(inverse) & Mask::from_bits(below(prim, &groups.slot[g]));
+    let tie = best.cmp_eq(inverse) & Mask::from_bits(below(prim, &groups.of[g].slot));
     let hit = inside & (best.cmp_lt(inverse) | tie);
-    groups.inv_lo[g] = select(hit, inverse, best);
-    groups.slot[g] = merge(hit, prim, groups.slot[g]);
+    groups.of[g].inv_lo = select(hit, inverse, best);
+    groups.of[g].slot = merge(hit, prim, groups.of[g].slot);
     // A hit just outside of an edge is reported on it.
     let inner = |e: V, k: usize| (e - V::splat(planes.eps[k][i])).fast_max(V::constant(0.0));
     let (e0, e1, e2) = (inner(e0, 0), inner(e1, 1), inner(e2, 2));
-    let weights = &mut groups.weights[g];
+    let weights = &mut groups.of[g].weights;
     weights[0] = select(hit, e1, weights[0]);
     weights[1] = select(hit, e2, weights[1]);
     weights[2] = select(hit, e0 + e1 + e2, weights[2]);
@@ -50,9 +50,9 @@ pub fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: 
 pub fn pair_to_end(groups: &mut Groups, planes: &Planes, g: usize, i: usize) -> bool {
     let (inside, _) = inside(groups, planes, g, i);
     let behind = behind(groups, planes, g, i);
-    let mut hit = inside & V::constant(0.0).cmp_le(behind) & groups.inv_lo[g].cmp_lt(V::splat(f32::INFINITY));
+    let mut hit = inside & V::constant(0.0).cmp_le(behind) & groups.of[g].inv_lo.cmp_lt(V::splat(f32::INFINITY));
     if groups.ends_early {
-        hit = hit & own_depth(planes, i, linear(groups, planes, g, i, 3)).cmp_le(groups.inv_hi[g]);
+        hit = hit & own_depth(planes, i, linear(groups, planes, g, i, 3)).cmp_le(groups.of[g].inv_hi);
     }
     occlude(groups, g, hit)
 }
@@ -60,8 +60,8 @@ pub fn pair_to_end(groups: &mut Groups, planes: &Planes, g: usize, i: usize) -> 
 /// How far the segments of a group start behind a triangle's plane as seen from their common end; in some unit.
 #[inline(always)]
 fn behind(groups: &Groups, planes: &Planes, g: usize, i: usize) -> V {
-    let [x, y, z] = [0, 1, 2].map(|a| groups.start[g][a] - V::splat(planes.side[a][i]));
-    let [nx, ny, nz] = [3, 4, 5].map(|a| V::splat(planes.side[a][i]));
+    let [x, y, z] = each(|a| groups.of[g].start[a] - V::splat(planes.side[a][i]));
+    let [nx, ny, nz] = each(|a| V::splat(planes.side[a + 3][i]));
     nz.mul_add(z, ny.mul_add(y, nx * x))
 }
 
@@ -79,22 +79,22 @@ pub fn pair_unsteady<const ANY: bool>(
 ) -> bool {
     let (inside, _) = inside(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
-    let best = groups.inv_lo[g];
-    let mut maybe = inside & inverse.cmp_le(groups.inv_hi[g]);
+    let best = groups.of[g].inv_lo;
+    let mut maybe = inside & inverse.cmp_le(groups.of[g].inv_hi);
     if ANY && to_end {
         maybe = maybe & V::constant(0.0).cmp_le(behind(groups, planes, g, i)) & best.cmp_lt(V::splat(f32::INFINITY));
     } else {
         maybe = maybe & best.cmp_le(inverse);
     }
     if !ANY {
-        maybe = maybe & (best.cmp_lt(inverse) | Mask::from_bits(below(prim, &groups.slot[g])));
+        maybe = maybe & (best.cmp_lt(inverse) | Mask::from_bits(below(prim, &groups.of[g].slot)));
     }
     let (mut rest, mut hit) = (maybe.bits(), 0);
-    let mut weights = groups.weights[g].map(V::to_array);
+    let mut weights = groups.of[g].weights.map(V::to_array);
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize & 15;
         rest &= rest - 1;
-        let ray = [groups.s[g].to_array()[lane], groups.t[g].to_array()[lane], 1.0].map(f64::from);
+        let ray = [groups.of[g].s.to_array()[lane], groups.of[g].t.to_array()[lane], 1.0].map(f64::from);
         let corners = planes.corners.map(|p| p.map(|x| f64::from(x[i])));
         if let Some(found) = weights_f64(corners, ray) {
             hit |= 1 << lane;
@@ -105,9 +105,9 @@ pub fn pair_unsteady<const ANY: bool>(
     if ANY {
         return occlude(groups, g, hit);
     }
-    groups.inv_lo[g] = select(hit, inverse, best);
-    groups.slot[g] = merge(hit, prim, groups.slot[g]);
-    groups.weights[g] = weights.map(V::new);
+    groups.of[g].inv_lo = select(hit, inverse, best);
+    groups.of[g].slot = merge(hit, prim, groups.of[g].slot);
+    groups.of[g].weights = weights.map(V::new);
     hit.any()
 }
 
@@ -130,22 +130,40 @@ fn weights_f64(corners: [[f64; 3]; 3], ray: [f64; 3]) -> Option<[f64; 3]> {
 /// A linear function of triangle `i` at the rays of a group.
 #[inline(always)]
 fn linear(groups: &Groups, planes: &Planes, g: usize, i: usize, k: usize) -> V {
-    let [x, y, z] = [0, 1, 2].map(|x| V::splat(planes.linear[k][x][i]));
-    x.mul_add(groups.s[g], y.mul_add(groups.t[g], z))
+    let [x, y, z] = each(|x| V::splat(planes.linear[k][x][i]));
+    x.mul_add(groups.of[g].s, y.mul_add(groups.of[g].t, z))
 }
 
-/// Lanes inside the triangle's edges, and the edge functions.
+/// Lanes inside the triangle, and the edge functions.
 #[inline(always)]
 fn inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> (Mask, [V; 3]) {
-    let edges = [0, 1, 2].map(|k| linear(groups, planes, g, i, k));
-    (V::constant(0.0).cmp_le(edges[0].fast_min(edges[1]).fast_min(edges[2])), edges)
+    let edges = each(|k| linear(groups, planes, g, i, k));
+    let least = edges[0].fast_min(edges[1]).fast_min(edges[2]);
+    let inside = V::constant(0.0).cmp_le(least);
+    let doubtful = inside & least.cmp_lt(V::splat(planes.doubt[i]));
+    if doubtful.any() {
+        return (between_corners(groups, planes, g, i, inside, doubtful), edges);
+    }
+    (inside, edges)
+}
+
+/// Of the lanes `inside`, those that are surely so, and those of the `doubtful` that are not beyond all corners.
+#[cold]
+#[inline(never)]
+fn between_corners(groups: &Groups, planes: &Planes, g: usize, i: usize, inside: Mask, doubtful: Mask) -> Mask {
+    let between = |axis: usize, x: V| {
+        let [low, high] = &planes.rect[axis];
+        (V::splat(low[i]).cmp_le(x) & x.cmp_le(V::splat(high[i]))).bits()
+    };
+    let beyond = !(between(0, groups.of[g].s) & between(1, groups.of[g].t));
+    Mask::from_bits(inside.bits() & !(doubtful.bits() & beyond))
 }
 
 /// Lanes that found something want nothing any more.
 #[inline(always)]
 fn occlude(groups: &mut Groups, g: usize, hit: Mask) -> bool {
-    groups.inv_lo[g] = select(hit, V::splat(f32::INFINITY), groups.inv_lo[g]);
-    groups.done[g] |= hit.bits();
+    groups.of[g].inv_lo = select(hit, V::splat(f32::INFINITY), groups.of[g].inv_lo);
+    groups.of[g].done |= hit.bits();
     hit.any()
 }
 
@@ -165,13 +183,13 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, cor
             any |= occlude(groups, g, hit);
             return;
         }
-        let inverse = (one / (found.t * groups.speed[g])).fast_min(V::splat(f32::MAX));
-        let best = groups.inv_lo[g];
-        let tie = best.cmp_eq(inverse) & Mask::from_bits(below(prim, &groups.slot[g]));
+        let inverse = (one / (found.t * groups.of[g].speed)).fast_min(V::splat(f32::MAX));
+        let best = groups.of[g].inv_lo;
+        let tie = best.cmp_eq(inverse) & Mask::from_bits(below(prim, &groups.of[g].slot));
         let wins = hit & (best.cmp_lt(inverse) | tie);
-        groups.inv_lo[g] = select(wins, inverse, best);
-        groups.slot[g] = merge(wins, prim, groups.slot[g]);
-        for (weight, x) in groups.weights[g].iter_mut().zip([found.u, found.v, one]) {
+        groups.of[g].inv_lo = select(wins, inverse, best);
+        groups.of[g].slot = merge(wins, prim, groups.of[g].slot);
+        for (weight, x) in groups.of[g].weights.iter_mut().zip([found.u, found.v, one]) {
             *weight = select(wins, x, *weight);
         }
         any |= wins.any();
@@ -183,11 +201,11 @@ impl Groups {
     /// Lanes of a group that hit something, and t, u, v there (elsewhere u and v are 0).
     #[inline(always)]
     fn own_numbers(&self, g: usize, rays: &Rays<f32>, first: usize) -> (Mask, V, V, V) {
-        let found = Mask::from_bits(!positions(&self.slot[g], NO_SLOT));
+        let found = Mask::from_bits(!positions(&self.of[g].slot, NO_SLOT));
         let one = V::constant(1.0);
         let (t_min, t_max) = (V::load(&rays.t_min[first..]), V::load(&rays.t_max[first..]));
-        let t = t_min.fast_max(t_max.fast_min(one / (self.inv_lo[g] * self.speed[g])));
-        let [u, v, sum] = self.weights[g];
+        let t = t_min.fast_max(t_max.fast_min(one / (self.of[g].inv_lo * self.of[g].speed)));
+        let [u, v, sum] = self.of[g].weights;
         let scale = one / sum;
         let or_zero = |x: V| select(found, x * scale, V::constant(0.0));
         (found, t, or_zero(u), or_zero(v))
@@ -201,7 +219,7 @@ impl Groups {
         select(found, t, V::splat(f32::INFINITY)).store(&mut hits.t[first..]);
         u.store(&mut hits.u[first..]);
         v.store(&mut hits.v[first..]);
-        hits.prim[first..first + V::N].copy_from_slice(&self.slot[g]);
+        hits.prim[first..first + V::N].copy_from_slice(&self.of[g].slot);
         let none = V::splat(f32::from_bits(INVALID_ID));
         let inst: [u32; 16] = bytemuck::cast(select(found, zero, none).to_array());
         hits.inst[first..first + V::N].copy_from_slice(&inst);
@@ -211,8 +229,8 @@ impl Groups {
     pub fn own_hits(&self, g: usize, rays: &Rays<f32>, first: usize) -> HitPacket<V> {
         let (found, t, u, v) = self.own_numbers(g, rays, first);
         let mut hit = HitPacket::new(select(found, t, V::load(&rays.t_max[first..])));
-        (hit.u, hit.v, hit.prim) = (u, v, self.slot[g]);
-        hit.inst = self.slot[g].map(|prim| if prim == NO_SLOT { INVALID_ID } else { 0 });
+        (hit.u, hit.v, hit.prim) = (u, v, self.of[g].slot);
+        hit.inst = self.of[g].slot.map(|prim| if prim == NO_SLOT { INVALID_ID } else { 0 });
         hit
     }
 }

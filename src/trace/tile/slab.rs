@@ -9,7 +9,7 @@ use super::bundle::{Bundle, Shared, load3};
 use super::groups::Groups;
 use super::node::MARGIN;
 use super::{GROUPS, HALF_ULP, V, select};
-use crate::lanes::{LaneMask, Lanes, Lanes3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
 use crate::math::Aabb;
 
 /// The score stays within these.
@@ -20,7 +20,7 @@ const SCORES: (i32, i32) = (-50, 400);
 pub struct Slabs {
     /// Depth per unit of each world axis, by group; valid where `ready` says so.
     per_axis: [Lanes3<V>; GROUPS],
-    ready: u32,
+    ready: u64,
     score: i32,
 }
 
@@ -45,7 +45,7 @@ impl Slabs {
 
     /// Whether to test a box that `groups` meet.
     #[inline(always)]
-    pub fn wanted<const ANY: bool>(&self, groups: u32) -> bool {
+    pub fn wanted<const ANY: bool>(&self, groups: u64) -> bool {
         self.score > 0 && (ANY || groups.count_ones() <= 4)
     }
 
@@ -62,25 +62,25 @@ impl Slabs {
 
     /// Of `groups`, those with a ray that meets the box.
     #[inline(never)]
-    pub fn test(&mut self, groups: &Groups, bundle: &Bundle, bounds: &Aabb<f32>, wanted: u32) -> u32 {
+    pub fn test(&mut self, groups: &Groups, bundle: &Bundle, bounds: &Aabb<f32>, wanted: u64) -> u64 {
         self.prepare(groups, bundle, wanted & !self.ready);
         let frame = &groups.frame;
         let margin = MARGIN * HALF_ULP * frame.extent + 2.0 * groups.slack / frame.scale;
-        let lo = [0, 1, 2].map(|a| V::splat(bounds.lo[a] - frame.apex[a] - margin));
-        let hi = [0, 1, 2].map(|a| V::splat(bounds.hi[a] - frame.apex[a] + margin));
+        let lo = each(|a| V::splat(bounds.lo[a] - frame.apex[a] - margin));
+        let hi = each(|a| V::splat(bounds.hi[a] - frame.apex[a] + margin));
         let more = V::splat(1.0 + 16.0 * HALF_ULP);
         let (mut met, mut rest) = (0, wanted);
         while rest != 0 {
             let g = rest.trailing_zeros() as usize & (GROUPS - 1);
             rest &= rest - 1;
-            let [x, y, z] = [0, 1, 2].map(|a| {
+            let [x, y, z] = each(|a| {
                 let (one, other) = (lo[a] * self.per_axis[g][a], hi[a] * self.per_axis[g][a]);
                 (one.fast_min(other), one.fast_max(other))
             });
             let near = x.0.fast_max(y.0).fast_max(z.0.fast_max(V::splat(0.0)));
             let far = x.1.fast_min(y.1).fast_min(z.1) * more;
-            let hit = near.cmp_le(far) & (near * groups.inv_lo[g]).cmp_le(more);
-            met |= u32::from(hit.any()) << g;
+            let hit = near.cmp_le(far) & (near * groups.of[g].inv_lo).cmp_le(more);
+            met |= u64::from(hit.any()) << g;
         }
         let (tested, culled) = (wanted.count_ones() as i32, (wanted & !met).count_ones() as i32);
         self.add(8 * culled - 2 * tested);
@@ -89,7 +89,7 @@ impl Slabs {
 
     /// Reciprocals of the directions, scaled so that the parameter is the depth.
     #[inline(always)]
-    fn prepare(&mut self, groups: &Groups, bundle: &Bundle, mut missing: u32) {
+    fn prepare(&mut self, groups: &Groups, bundle: &Bundle, mut missing: u64) {
         self.ready |= missing;
         // Far below the margin of the boxes, far above what overflows.
         let least = V::splat(1e-10 / groups.frame.scale);
@@ -101,11 +101,11 @@ impl Slabs {
                 Shared::Start => load3(&bundle.rays.dir, at),
                 Shared::End(_) => {
                     let org = load3(&bundle.rays.org, at);
-                    [0, 1, 2].map(|a| org[a] - V::splat(groups.frame.apex[a]))
+                    each(|a| org[a] - V::splat(groups.frame.apex[a]))
                 }
             };
-            let per_depth = V::constant(1.0) / groups.speed[g];
-            self.per_axis[g] = direction.map(|d| {
+            let per_depth = V::constant(1.0) / groups.of[g].speed;
+            self.per_axis[g] = map3(direction, |d| {
                 let d = d * per_depth;
                 V::constant(1.0) / select(d.abs().cmp_lt(least), least, d)
             });

@@ -4,7 +4,7 @@
 use super::exact::Exact;
 use super::node::{Level, Planes, key};
 use super::pairs::flush;
-use super::{GROUPS, Memory, V};
+use super::{Memory, SET, V};
 use crate::bvh::{Child, Node, WIDTH};
 use crate::lanes::Lanes;
 use crate::lanes::words::{least_key, prefetch};
@@ -13,12 +13,12 @@ use crate::scene::world::Object;
 
 use super::batch::BATCH;
 
-/// Traces what is loaded in `memory` through the object.
+/// Traces the `N` sets that are loaded in `memory` through the object.
 #[inline(always)]
-pub fn walk<const ANY: bool, const EXACT: bool, const COUNT: bool>(
+pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     memory: &mut Memory,
     exact: &Exact,
-    groups: u32,
+    groups: u64,
     counters: &mut Counters,
 ) {
     let tree = &exact.object.tree;
@@ -28,7 +28,7 @@ pub fn walk<const ANY: bool, const EXACT: bool, const COUNT: bool>(
     let planes = Planes::of(&memory.groups);
     let mut limit = limit(memory);
     let mut depth = 0;
-    if !open::<COUNT>(exact.object, &planes, root, 0, groups, &mut memory.levels[0], counters) {
+    if !open::<N, COUNT>(exact.object, &planes, root, 0, groups, &mut memory.levels[0], counters) {
         return;
     }
     loop {
@@ -42,7 +42,7 @@ pub fn walk<const ANY: bool, const EXACT: bool, const COUNT: bool>(
             continue;
         }
         level.remove(slot);
-        let mut met = level.groups_at(slot, &memory.groups);
+        let mut met = level.groups_at::<N>(slot, &memory.groups);
         let node = &tree.nodes[level.node as usize];
         if met != 0 && memory.slabs.wanted::<ANY>(met) {
             met = memory.slabs.test(&memory.groups, exact.bundle, &node.child_bounds(slot), met);
@@ -52,18 +52,18 @@ pub fn walk<const ANY: bool, const EXACT: bool, const COUNT: bool>(
         }
         let child = node.child(slot);
         if child.is_leaf() {
-            leaf::<ANY, EXACT, COUNT>(memory, exact, child, met, counters);
+            leaf::<N, ANY, EXACT, COUNT>(memory, exact, child, met, counters);
             limit = self::limit(memory);
         } else {
             let node = &tree.nodes[child.index as usize];
             let below = &mut memory.levels[depth + 1];
-            if open::<COUNT>(exact.object, &planes, node, child.index, met, below, counters) {
+            if open::<N, COUNT>(exact.object, &planes, node, child.index, met, below, counters) {
                 depth += 1;
             }
         }
     }
     if memory.batch.len() > 0 {
-        flush::<ANY, EXACT, COUNT>(memory, exact, counters);
+        flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
     }
 }
 
@@ -75,12 +75,12 @@ fn limit(memory: &Memory) -> u32 {
 }
 
 #[inline(always)]
-fn open<const COUNT: bool>(
+fn open<const N: usize, const COUNT: bool>(
     object: &Object<f32>,
     planes: &Planes,
     node: &Node<f32>,
     index: u32,
-    groups: u32,
+    groups: u64,
     level: &mut Level,
     counters: &mut Counters,
 ) -> bool {
@@ -89,7 +89,7 @@ fn open<const COUNT: bool>(
         counters.boxes += u64::from(node.used);
         counters.box_lanes += WIDTH as u64;
         counters.node_lanes_active += u64::from(groups.count_ones()) * V::N as u64;
-        counters.node_lanes_total += (GROUPS * V::N) as u64;
+        counters.node_lanes_total += (N * SET * V::N) as u64;
     }
     let mut met = planes.open(node, level);
     if met == 0 {
@@ -110,11 +110,11 @@ fn open<const COUNT: bool>(
 }
 
 #[inline(always)]
-fn leaf<const ANY: bool, const EXACT: bool, const COUNT: bool>(
+fn leaf<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     memory: &mut Memory,
     exact: &Exact,
     child: Child,
-    groups: u32,
+    groups: u64,
     counters: &mut Counters,
 ) {
     let count = usize::from(child.count);
@@ -122,7 +122,7 @@ fn leaf<const ANY: bool, const EXACT: bool, const COUNT: bool>(
         counters.leaves += 1;
     }
     if memory.batch.len() + count > BATCH {
-        flush::<ANY, EXACT, COUNT>(memory, exact, counters);
+        flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
     }
     memory.batch.push::<EXACT>(&exact.object.triangles[child.index as usize], child.index * 8, count, groups);
 }
