@@ -85,16 +85,20 @@ fn store3<V: Lanes>(from: Lanes3<V>, to: &mut [[V::Scalar; RAYS]; 3], at: usize)
 }
 
 impl<S: Real> Chunk<S> {
-    /// Takes rays from a batch.
+    /// Takes at most [`RAYS`] rays from a batch, which is not empty; the ends of their segments go to `t`.
     #[inline(always)]
-    pub fn gather<V: Lanes<Scalar = S>>(&mut self, rays: &Rays<S>, ids: &[u32]) {
-        self.len = ids.len();
-        for (i, &id) in ids.iter().enumerate() {
-            for axis in 0..3 {
-                self.org[axis][i] = rays.org[axis][id as usize];
-                self.dir[axis][i] = rays.dir[axis][id as usize];
-            }
-            self.t_min[i] = rays.t_min[id as usize];
+    pub fn gather<V: Lanes<Scalar = S>>(&mut self, rays: &Rays<S>, ids: &[u32], t: &mut [S; RAYS]) {
+        self.len = ids.len().min(RAYS);
+        // Columns of one known length, so that a ray's number is looked at once instead of eight times.
+        let n = rays.padded_len();
+        let [ox, oy, oz] = [0, 1, 2].map(|a| &rays.org[a][..n]);
+        let [dx, dy, dz] = [0, 1, 2].map(|a| &rays.dir[a][..n]);
+        let (t_min, t_max) = (&rays.t_min[..n], &rays.t_max[..n]);
+        for (i, &id) in ids.iter().enumerate().take(RAYS) {
+            let id = (id as usize).min(n - 1);
+            (self.org[0][i], self.org[1][i], self.org[2][i]) = (ox[id], oy[id], oz[id]);
+            (self.dir[0][i], self.dir[1][i], self.dir[2][i]) = (dx[id], dy[id], dz[id]);
+            (self.t_min[i], t[i]) = (t_min[id], t_max[id]);
         }
         for at in (0..self.len).step_by(V::N) {
             let (org, dir) = (load3::<V>(&self.org, at), load3::<V>(&self.dir, at));
@@ -223,12 +227,10 @@ impl<S: Real> Default for Best<S> {
 }
 
 impl<S: Real> Best<S> {
-    /// Nothing found yet.
+    /// Nothing found yet, once the ends of the segments are there.
     #[inline(always)]
-    pub fn start(&mut self, rays: &Rays<S>, ids: &[u32]) {
-        for (t, &id) in self.t.iter_mut().zip(ids) {
-            *t = rays.t_max[id as usize];
-        }
+    pub fn start(&mut self) {
+        (self.u, self.v) = ([S::ZERO; RAYS], [S::ZERO; RAYS]);
         self.prim = [INVALID_ID; RAYS];
         self.inst = [INVALID_ID; RAYS];
         self.done = 0;
@@ -261,21 +263,27 @@ impl<S: Real> Best<S> {
         self.inst[at..at + V::N].copy_from_slice(&hit.inst[..V::N]);
     }
 
-    /// Writes the hits to their places in a batch, whose hits are misses so far.
+    /// Writes the hits to their places in a batch.
     #[inline(always)]
     pub fn scatter(&self, hits: &mut Hits<S>, ids: &[u32]) {
-        for (i, &id) in ids.iter().enumerate().filter(|&(i, _)| self.prim[i] != INVALID_ID) {
-            let id = id as usize;
-            (hits.t[id], hits.u[id], hits.v[id]) = (self.t[i], self.u[i], self.v[i]);
-            (hits.prim[id], hits.inst[id]) = (self.prim[i], self.inst[i]);
+        let n = hits.t.len();
+        let (t, u, v) = (&mut hits.t[..n], &mut hits.u[..n], &mut hits.v[..n]);
+        let (prim, inst) = (&mut hits.prim[..n], &mut hits.inst[..n]);
+        for (i, &id) in ids.iter().enumerate().take(RAYS) {
+            let id = (id as usize).min(n - 1);
+            t[id] = if self.prim[i] == INVALID_ID { S::INFINITY } else { self.t[i] };
+            (u[id], v[id], prim[id], inst[id]) = (self.u[i], self.v[i], self.prim[i], self.inst[i]);
         }
     }
 
-    /// Writes what any-hit found.
+    /// Writes what any-hit found where it found something.
     #[inline(always)]
     pub fn scatter_done(&self, out: &mut [u8], ids: &[u32]) {
-        for (i, &id) in ids.iter().enumerate() {
-            out[id as usize] = (self.done >> i & 1) as u8;
+        let mut rest = self.done;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            out[ids[i] as usize] = 1;
         }
     }
 }

@@ -21,6 +21,7 @@ use std::marker::PhantomData;
 use super::output::Output;
 use super::query::{Query, Stack};
 use super::{Engine, Engines, Scratch, traverse};
+use crate::lanes::words::transpose_bits;
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
@@ -35,11 +36,14 @@ const SPREAD: f64 = 0.25;
 /// Octants of directions.
 const OCTANTS: usize = 8;
 
+/// Octants times dominant axes, the latter rounded up to a power of two.
+const KEYS: usize = 4 * OCTANTS;
+
 /// Working memory of the engine.
 #[derive(Clone, Debug)]
 pub struct Memory<S> {
-    /// Numbers of the rays of each octant, along each dominant axis.
-    bins: [[Vec<u32>; 3]; OCTANTS],
+    /// Numbers of the rays of each octant along each dominant axis: octants along x, then along y, then along z.
+    bins: [Vec<u32>; KEYS],
     /// Those of one octant, along x, then y, then z.
     ids: Vec<u32>,
     chunk: Chunk<S>,
@@ -109,42 +113,64 @@ impl<S: Real> Job<'_, S> {
         if COUNT {
             self.counters.rays += u64::from(live.count_ones());
         }
-        let backward = packet.rcp.map(|r| r.cmp_lt(V::constant(0.0)).bits());
-        if coherent(&packet, backward, live) {
-            let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
-            if live != 0 {
-                traverse::world(self.world, &packet, &mut query, live);
-            }
-            let (hit, done) = (query.hit, query.done);
-            self.output.put(at, &hit, done);
+        // The sign of the reciprocal, without a division.
+        let backward = packet.dir.map(|d| d.cmp_le(V::splat(-S::MIN_POSITIVE)).bits());
+        let uniform = |bits: u32| bits & live == 0 || bits & live == live;
+        let [_, y, z] = packet.dominant;
+        let alike = backward.into_iter().chain([y, z]).all(uniform);
+        if live != 0 && alike && self.packet::<V, ANY, COUNT>(at, live) {
             return 0;
         }
-        self.output.put(at, &HitPacket::<V>::new(t_max), 0);
+        match &mut self.output {
+            Output::Closest(hits) if live != V::ALL => HitPacket::<V>::new(t_max).store(hits, at),
+            Output::Closest(_) => {}
+            Output::Any(out) => out.iter_mut().skip(at).take(V::N).for_each(|out| *out = 0),
+        }
+        let keys = transpose_bits([backward[0], backward[1], backward[2], y, z]);
         let mut rest = live;
         while rest != 0 {
             let lane = rest.trailing_zeros();
             rest &= rest - 1;
-            let octant = (0..3).fold(0, |o, axis| o | (backward[axis] >> lane & 1) << axis);
-            let axis = (packet.dominant[1] >> lane & 1 | (packet.dominant[2] >> lane & 1) << 1) as usize;
-            self.memory.bins[octant as usize & (OCTANTS - 1)][axis].push(at as u32 + lane);
+            let key = usize::from(keys[lane as usize % keys.len()]);
+            self.memory.bins[key % KEYS].push(at as u32 + lane);
         }
         live.count_ones() as usize
+    }
+
+    /// Traces the `live` rays of one octant and dominant axis that start at `at` as a packet, if they point nearly the
+    /// same way; otherwise returns false.
+    #[inline(never)]
+    fn packet<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize, live: u32) -> bool {
+        let (packet, t_max, _) = Packet::<V>::load(self.rays, at);
+        let spread = |slope: V| {
+            let (low, high) = slope.range(live);
+            high - low
+        };
+        let most = V::Scalar::from_f64(SPREAD);
+        if !(spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most) {
+            return false;
+        }
+        let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
+        traverse::world(self.world, &packet, &mut query, live);
+        let (hit, done) = (query.hit, query.done);
+        self.output.put(at, &hit, done);
+        true
     }
 
     /// Traces what was sorted, chunk by chunk.
     #[inline(always)]
     fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
         let Memory { bins, ids, chunk, local, best, waiting } = &mut *self.memory;
-        for (octant, bins) in bins.iter_mut().enumerate() {
+        for octant in 0..OCTANTS {
             ids.clear();
-            bins.iter_mut().for_each(|alike| ids.append(alike));
+            bins[octant..].iter_mut().step_by(OCTANTS).for_each(|alike| ids.append(alike));
             let mut rest = &ids[..];
             while !rest.is_empty() {
                 // Chunks of nearly equal sizes.
                 let (ids, others) = rest.split_at(rest.len().div_ceil(rest.len().div_ceil(RAYS)));
                 rest = others;
-                chunk.gather::<V>(self.rays, ids);
-                best.start(self.rays, ids);
+                chunk.gather::<V>(self.rays, ids, &mut best.t);
+                best.start();
                 let (stack, counters) = (&mut *self.stack, &mut *self.counters);
                 let mut walk = walk::Walk { best: &mut *best, waiting: &mut *waiting, stack, counters };
                 walk.world::<V, ANY, COUNT>(self.world, chunk, local, octant);
@@ -155,21 +181,6 @@ impl<S: Real> Job<'_, S> {
             }
         }
     }
-}
-
-/// Whether the packet kernel is the better one for these rays: one octant, one dominant axis, nearly one direction.
-#[inline(always)]
-fn coherent<V: Lanes>(packet: &Packet<V>, backward: [u32; 3], live: u32) -> bool {
-    let uniform = backward.iter().all(|bits| bits & live == 0 || bits & live == live);
-    if !uniform || !packet.dominant.iter().any(|bits| bits & live == live) {
-        return false;
-    }
-    let spread = |slope: V| {
-        let (low, high) = slope.range(live);
-        high - low
-    };
-    let most = V::Scalar::from_f64(SPREAD);
-    live == 0 || (spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most)
 }
 
 impl<V: Lanes> Engine<V::Scalar> for Stream<V>
