@@ -7,8 +7,11 @@ use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
 use crate::scene::world::Instance;
 use crate::shape::{Turned, around};
 
-/// Most rays in a chunk: one bit each in a word.
-pub const RAYS: usize = 64;
+/// Most rays in a chunk: one bit each in a [`Set`].
+pub const RAYS: usize = 128;
+
+/// A set of rays of a chunk.
+pub type Set = u128;
 
 /// Up to this many rays go into an instance one by one.
 const FEW: u32 = 4;
@@ -34,7 +37,7 @@ pub struct Chunk<S> {
     /// Dominant axis of each ray.
     pub axis: [u8; RAYS],
     /// Rays with each dominant axis.
-    pub dominant: [u64; 3],
+    pub dominant: [Set; 3],
     /// Sum of the directions.
     pub mean: [S; 3],
     /// Number of rays.
@@ -52,7 +55,7 @@ pub struct Best<S> {
     prim: [u32; RAYS],
     inst: [u32; RAYS],
     /// Any-hit: rays that found something.
-    pub done: u64,
+    pub done: Set,
 }
 
 impl<S: Real> Default for Chunk<S> {
@@ -114,8 +117,8 @@ impl<S: Real> Chunk<S> {
         from: &Self,
         instance: &Instance<S>,
         t: &[S; RAYS],
-        rays: u64,
-    ) -> u64 {
+        rays: Set,
+    ) -> Set {
         self.len = from.len;
         let mut inside = 0;
         if rays.count_ones() <= FEW {
@@ -142,7 +145,7 @@ impl<S: Real> Chunk<S> {
         t: &[S; RAYS],
         at: usize,
         lanes: u32,
-    ) -> u64 {
+    ) -> Set {
         if lanes == 0 {
             return 0;
         }
@@ -157,7 +160,7 @@ impl<S: Real> Chunk<S> {
         store3(local.dir, &mut self.dir, at);
         local.t_min.store(&mut self.t_min[at..]);
         self.put(at, &local);
-        u64::from(meets) << at
+        Set::from(meets) << at
     }
 
     fn sum_of_directions(&self) -> [S; 3] {
@@ -179,7 +182,7 @@ impl<S: Real> Chunk<S> {
             self.axis[at + lane] = (y >> lane & 1 | (z >> lane & 1) << 1) as u8;
         }
         for (mask, bits) in self.dominant.iter_mut().zip(packet.dominant) {
-            *mask = *mask & !(u64::from(V::ALL) << at) | u64::from(bits) << at;
+            *mask = *mask & !(Set::from(V::ALL) << at) | Set::from(bits) << at;
         }
     }
 
@@ -206,7 +209,7 @@ impl<S: Real> Chunk<S> {
     }
 
     /// Rays by octant.
-    pub fn octants(&self, rays: u64) -> [u64; OCTANTS] {
+    pub fn octants(&self, rays: Set) -> [Set; OCTANTS] {
         let mut masks = [0; OCTANTS];
         let mut rest = rays;
         while rest != 0 {
@@ -238,9 +241,10 @@ impl<S: Real> Best<S> {
 
     /// Rays whose segments, as far as they are still looked at, reach to `near`.
     #[inline(always)]
-    pub fn reaching<V: Lanes<Scalar = S>>(&self, near: S) -> u64 {
+    pub fn reaching<V: Lanes<Scalar = S>>(&self, near: S) -> Set {
         let near = V::splat(near);
-        (0..RAYS).step_by(V::N).fold(0, |all, at| all | u64::from(near.cmp_le(V::load(&self.t[at..])).bits()) << at)
+        let reach = |at: usize| Set::from(near.cmp_le(V::load(&self.t[at..])).bits()) << at;
+        (0..RAYS).step_by(V::N).fold(0, |all, at| all | reach(at))
     }
 
     /// The hits of rays `at..at + N`.

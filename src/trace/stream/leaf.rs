@@ -1,6 +1,6 @@
 //! Leaves: a chunk's rays against one block of primitives.
 
-use super::chunk::{Chunk, RAYS};
+use super::chunk::{Chunk, RAYS, Set};
 use super::walk::Walk;
 use crate::bvh::Child;
 use crate::lanes::{Lanes, Real};
@@ -21,7 +21,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
     chunk: &Chunk<V::Scalar>,
     walk: &mut Walk<V::Scalar>,
     child: Child,
-    rays: u64,
+    rays: Set,
 ) {
     let kernel = |packet: &Packet<V>, query: &mut Query<V, ANY, COUNT>, lanes: u32| {
         leaf::block(object, inst, packet, query, child, lanes);
@@ -33,12 +33,16 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
     let mut few = rays;
     if rays.count_ones() >= DENSE {
         for at in (0..chunk.len).step_by(V::N) {
+            let lanes = (rays >> at) as u32 & V::ALL;
+            if lanes.count_ones() < DENSE {
+                continue;
+            }
             // A vector tests rays of one dominant axis at once.
             for dominant in chunk.dominant {
-                let lanes = (rays & dominant) >> at & u64::from(V::ALL);
+                let lanes = lanes & (dominant >> at) as u32;
                 if lanes.count_ones() >= DENSE {
-                    few &= !(lanes << at);
-                    vector(chunk, walk, at, lanes as u32, kernel);
+                    few &= !(Set::from(lanes) << at);
+                    vector(chunk, walk, at, lanes, kernel);
                 }
             }
         }
@@ -53,7 +57,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
 pub fn vectors<V: Lanes, const ANY: bool, const COUNT: bool>(
     chunk: &Chunk<V::Scalar>,
     walk: &mut Walk<V::Scalar>,
-    rays: u64,
+    rays: Set,
     kernel: impl Fn(&Packet<V>, &mut Query<V, ANY, COUNT>, u32),
 ) {
     for at in (0..chunk.len).step_by(V::N) {
@@ -79,7 +83,7 @@ fn vector<V: Lanes, const ANY: bool, const COUNT: bool>(
     kernel(&packet, &mut query, lanes);
     let (hit, done) = (query.hit, query.done);
     if ANY {
-        walk.best.done |= u64::from(done) << at;
+        walk.best.done |= Set::from(done) << at;
     } else {
         walk.best.put(at, &hit);
     }
@@ -93,7 +97,7 @@ fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
     chunk: &Chunk<S>,
     walk: &mut Walk<S>,
     child: Child,
-    mut rays: u64,
+    mut rays: Set,
 ) {
     let block = &object.triangles[child.index as usize];
     let slots = (1 << child.count) - 1;

@@ -1,24 +1,32 @@
 //! A chunk's rays against the eight boxes of a node.
 
-use super::chunk::{Chunk, RAYS};
+use super::chunk::{Chunk, RAYS, Set};
 use crate::bvh::{Node, WIDTH};
 use crate::lanes::words::Marks;
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::slab::{Interval, pad};
 
 /// From this many rays on they are tested as vectors.
-const DENSE: u32 = 30;
+const DENSE: u32 = 48;
 
 /// Which rays meet which child.
 pub struct Met<S> {
     /// Children that some ray meets, as bits.
     pub children: u32,
-    /// Rays that meet each child.
-    pub rays: [u64; WIDTH],
+    /// Rays that meet each child: of the first and of the second 64 of the chunk.
+    halves: [[u64; WIDTH]; 2],
     /// Order of the children.
     pub near: [S; WIDTH],
     /// Whether `near` is where the first ray enters.
     pub bound: bool,
+}
+
+impl<S> Met<S> {
+    /// Rays that meet a child.
+    #[inline(always)]
+    pub fn rays(&self, slot: usize) -> Set {
+        Set::from(self.halves[0][slot]) | Set::from(self.halves[1][slot]) << 64
+    }
 }
 
 /// The planes of all children that rays of `octant` meet first and last, axis by axis.
@@ -36,7 +44,7 @@ pub fn meet<V: Lanes, const ANY: bool>(
     node: &Node<V::Scalar>,
     chunk: &Chunk<V::Scalar>,
     t: &[V::Scalar; RAYS],
-    rays: u64,
+    rays: Set,
     octant: usize,
 ) -> Met<V::Scalar> {
     if rays.count_ones() >= DENSE {
@@ -52,32 +60,36 @@ fn sparse<S: Real, const ANY: bool>(
     node: &Node<S>,
     chunk: &Chunk<S>,
     t: &[S; RAYS],
-    mut rays: u64,
+    rays: Set,
     octant: usize,
 ) -> Met<S> {
     let planes = planes(node, octant).map(|(near, far)| (S::Octo::load(near), S::Octo::load(far)));
-    let mut marks = Marks::none();
+    let mut marks = [Marks::none(); 2];
     let mut first = S::Octo::splat(S::INFINITY);
-    while rays != 0 {
-        let i = rays.trailing_zeros();
-        rays &= rays - 1;
-        let ray = i as usize & (RAYS - 1);
-        let [x, y, z] = [0, 1, 2].map(|a| {
-            let (org, rcp) = (S::Octo::splat(chunk.org[a][ray]), S::Octo::splat(chunk.rcp[a][ray]));
-            ((planes[a].0 - org) * rcp, (planes[a].1 - org) * rcp)
-        });
-        let near = x.0.fast_max(y.0).fast_max(z.0);
-        let interval = Interval { near, far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
-        let meets = interval.meets(S::Octo::splat(chunk.t_min[ray]), S::Octo::splat(t[ray]));
-        if !ANY {
-            first = S::Octo::select(meets, near.fast_min(first), first);
+    for (half, marks) in marks.iter_mut().enumerate() {
+        let mut rest = (rays >> (64 * half)) as u64;
+        while rest != 0 {
+            let i = rest.trailing_zeros();
+            rest &= rest - 1;
+            let ray = (64 * half + i as usize) & (RAYS - 1);
+            let [x, y, z] = [0, 1, 2].map(|a| {
+                let (org, rcp) = (S::Octo::splat(chunk.org[a][ray]), S::Octo::splat(chunk.rcp[a][ray]));
+                ((planes[a].0 - org) * rcp, (planes[a].1 - org) * rcp)
+            });
+            let near = x.0.fast_max(y.0).fast_max(z.0);
+            let interval = Interval { near, far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
+            let meets = interval.meets(S::Octo::splat(chunk.t_min[ray]), S::Octo::splat(t[ray]));
+            if !ANY {
+                first = S::Octo::select(meets, near.fast_min(first), first);
+            }
+            *marks = marks.with(meets.bits(), i);
         }
-        marks = marks.with(meets.bits(), i);
     }
     let mut near = [S::ZERO; WIDTH];
     first.store(&mut near);
     // Slots without a child are empty boxes, which no ray of an octant meets.
-    Met { children: marks.not_zero(), rays: marks.words(), near, bound: true }
+    let [low, high] = marks;
+    Met { children: low.not_zero() | high.not_zero(), halves: [low.words(), high.words()], near, bound: true }
 }
 
 /// One child after the other against vectors of rays.
@@ -86,12 +98,12 @@ fn dense<V: Lanes, const ANY: bool>(
     node: &Node<V::Scalar>,
     chunk: &Chunk<V::Scalar>,
     t: &[V::Scalar; RAYS],
-    rays: u64,
+    rays: Set,
     octant: usize,
 ) -> Met<V::Scalar> {
     let planes = planes(node, octant);
-    let mut met = Met { children: 0, rays: [0; WIDTH], near: [V::Scalar::ZERO; WIDTH], bound: false };
-    for at in (0..chunk.len).step_by(V::N) {
+    let mut met = Met { children: 0, halves: [[0; WIDTH]; 2], near: [V::Scalar::ZERO; WIDTH], bound: false };
+    for at in (0..chunk.len.min(RAYS)).step_by(V::N) {
         let lanes = (rays >> at) as u32 & V::ALL;
         if lanes == 0 {
             continue;
@@ -105,11 +117,11 @@ fn dense<V: Lanes, const ANY: bool>(
             });
             let near = x.0.fast_max(y.0).fast_max(z.0);
             let interval = Interval { near, far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
-            met.rays[child] |= u64::from(interval.meets(t_min, t).bits() & lanes) << at;
+            met.halves[at / 64][child] |= u64::from(interval.meets(t_min, t).bits() & lanes) << (at % 64);
         }
     }
     for child in 0..WIDTH {
-        met.children |= u32::from(met.rays[child] != 0) << child;
+        met.children |= u32::from((met.halves[0][child] | met.halves[1][child]) != 0) << child;
     }
     if !ANY {
         // How far the near corner lies along the mean direction.

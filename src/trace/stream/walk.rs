@@ -1,6 +1,6 @@
 //! A chunk's way through the trees.
 
-use super::chunk::{Best, Chunk, RAYS};
+use super::chunk::{Best, Chunk, RAYS, Set};
 use super::{leaf, node};
 use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::words::prefetch_either;
@@ -13,7 +13,7 @@ use crate::trace::query::Stack;
 /// What waits to be visited: a box and the rays that meet it.
 #[derive(Clone, Copy, Debug)]
 pub struct Waiting<S> {
-    rays: u64,
+    rays: Set,
     /// Order, and if `bound`, where the first ray enters.
     near: S,
     bound: bool,
@@ -41,7 +41,7 @@ impl<S: Real> Walk<'_, S> {
         local: &mut Chunk<S>,
         octant: usize,
     ) {
-        let all = u64::MAX >> (RAYS - chunk.len);
+        let all = Set::MAX >> (RAYS - chunk.len);
         if world.is_single_object() {
             let object = &world.objects[world.instances[0].object as usize];
             self.object::<V, ANY, COUNT>(object, 0, chunk, all, octant);
@@ -67,7 +67,7 @@ impl<S: Real> Walk<'_, S> {
         inst: u32,
         (chunk, octant): (&Chunk<S>, usize),
         local: &mut Chunk<S>,
-        rays: u64,
+        rays: Set,
     ) {
         let instance = &world.instances[inst as usize];
         let object = &world.objects[instance.object as usize];
@@ -86,7 +86,7 @@ impl<S: Real> Walk<'_, S> {
         object: &Object<S>,
         inst: u32,
         chunk: &Chunk<S>,
-        rays: u64,
+        rays: Set,
         octant: usize,
     ) {
         if object.has_unbounded() {
@@ -107,10 +107,10 @@ impl<S: Real> Walk<'_, S> {
         &mut self,
         tree: &Tree<S>,
         chunk: &Chunk<S>,
-        rays: u64,
+        rays: Set,
         octant: usize,
         fetch: &impl Fn(Child),
-        mut leaf: impl FnMut(&mut Self, Child, u64),
+        mut leaf: impl FnMut(&mut Self, Child, Set),
     ) {
         if tree.nodes.is_empty() {
             return;
@@ -150,11 +150,11 @@ impl<S: Real> Walk<'_, S> {
 
     /// The child to visit next with its rays; the others that are met go to the stack, nearest on top.
     #[inline(always)]
-    fn choose<const ANY: bool>(&mut self, node: &Node<S>, met: &node::Met<S>, fetch: &impl Fn(Child)) -> (Child, u64) {
+    fn choose<const ANY: bool>(&mut self, node: &Node<S>, met: &node::Met<S>, fetch: &impl Fn(Child)) -> (Child, Set) {
         let entry = |slot: usize| {
             let child = node.child(slot);
             fetch(child);
-            Waiting { rays: met.rays[slot], near: met.near[slot], bound: met.bound, child }
+            Waiting { rays: met.rays(slot), near: met.near[slot], bound: met.bound, child }
         };
         let mut rest = met.children;
         if ANY {
