@@ -6,7 +6,7 @@ use crate::bvh::Child;
 use crate::lanes::{Lanes, Real};
 use crate::ray::{HitPacket, Packet};
 use crate::scene::world::{Class, Object};
-use crate::shape::Triangle;
+use crate::shape::{BLOCK, Triangle};
 use crate::trace::leaf;
 use crate::trace::query::Query;
 
@@ -89,7 +89,56 @@ fn vector<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
 }
 
-/// One ray after the other against all triangles of the block.
+/// Rays of a chunk with triangles of a block that are to be looked at closer.
+#[derive(Clone, Debug)]
+pub struct Pairs {
+    ray: [u8; Self::ROOM],
+    slot: [u8; Self::ROOM],
+    len: usize,
+}
+
+impl Default for Pairs {
+    fn default() -> Self {
+        Self { ray: [0; Self::ROOM], slot: [0; Self::ROOM], len: 0 }
+    }
+}
+
+impl Pairs {
+    /// Every ray with every triangle, and what is written past the last of them.
+    const ROOM: usize = (RAYS + 1) * BLOCK;
+
+    /// The set bits of each byte, ascending, then zeros.
+    const SET_BITS: [[u8; BLOCK]; 256] = {
+        let mut table = [[0; BLOCK]; 256];
+        let mut mask = 0;
+        while mask < 256 {
+            let (mut bit, mut count) = (0, 0);
+            while bit < BLOCK {
+                if mask >> bit & 1 != 0 {
+                    table[mask][count] = bit as u8;
+                    count += 1;
+                }
+                bit += 1;
+            }
+            mask += 1;
+        }
+        table
+    };
+
+    /// Adds a ray with the triangles whose bits are set. Always writes eight and takes back those that are too many: how
+    /// many there are is a surprise every time.
+    #[inline(always)]
+    fn add(&mut self, ray: usize, slots: u32) {
+        let slots = slots as usize & 0xff;
+        let at = self.len.min(Self::ROOM - BLOCK);
+        self.ray[at..at + BLOCK].copy_from_slice(&[ray as u8; BLOCK]);
+        self.slot[at..at + BLOCK].copy_from_slice(&Self::SET_BITS[slots]);
+        self.len = at + slots.count_ones() as usize;
+    }
+}
+
+/// One ray after the other against all triangles of the block; then, pair by pair, a closer look at those that it may
+/// hit.
 #[inline(always)]
 fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
     object: &Object<S>,
@@ -101,35 +150,29 @@ fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
 ) {
     let block = &object.triangles[child.index as usize];
     let slots = (1 << child.count) - 1;
+    walk.pairs.len = 0;
     while rays != 0 {
-        let i = rays.trailing_zeros();
+        let ray = rays.trailing_zeros() as usize & (RAYS - 1);
         rays &= rays - 1;
-        let ray = i as usize & (RAYS - 1);
-        let turned = chunk.turned(ray);
-        let mut maybe = slots & Triangle::candidates(&turned, chunk.t_min[ray], walk.best.t[ray], block);
+        let maybe = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], walk.best.t[ray], block);
+        walk.pairs.add(ray, slots & maybe);
         if COUNT {
             walk.counters.leaves += 1;
             walk.counters.prims += u64::from(child.count);
             walk.counters.prim_lanes_active += u64::from(child.count);
             walk.counters.prim_lanes_total += u64::from(child.count);
         }
-        while maybe != 0 {
-            let slot = maybe.trailing_zeros() as usize & 7;
-            maybe &= maybe - 1;
-            let found = Triangle::look_closer(&chunk.packet::<S>(ray), &turned, &block.get(slot));
-            if !found.hit {
-                continue;
-            }
-            if ANY {
-                if found.t <= walk.best.t[ray] {
-                    walk.best.done |= 1 << i;
-                    break;
-                }
-            } else {
-                let mut hit = walk.best.packet::<S>(ray);
-                hit.commit(1, &found, block.prim[slot], inst);
-                walk.best.put(ray, &hit);
-            }
+    }
+    for at in 0..walk.pairs.len.min(Pairs::ROOM) {
+        let ray = usize::from(walk.pairs.ray[at]) & (RAYS - 1);
+        let slot = usize::from(walk.pairs.slot[at]) & (BLOCK - 1);
+        let found = Triangle::look_closer(&chunk.packet::<S>(ray), &chunk.turned(ray), &block.get(slot));
+        if ANY {
+            walk.best.done |= Set::from(found.hit & (found.t <= walk.best.t[ray])) << ray;
+        } else {
+            let mut hit = walk.best.packet::<S>(ray);
+            hit.commit(1, &found, block.prim[slot], inst);
+            walk.best.put(ray, &hit);
         }
     }
 }

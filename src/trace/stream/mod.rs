@@ -21,7 +21,7 @@ use std::marker::PhantomData;
 use super::output::Output;
 use super::query::{Query, Stack};
 use super::{Engine, Engines, Scratch, traverse};
-use crate::lanes::words::transpose_bits;
+use crate::lanes::words::{prefetch, transpose_bits};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
@@ -32,6 +32,9 @@ const SOURCE: usize = 1024;
 
 /// Widest range of the slopes of rays that are traced as a packet.
 const SPREAD: f64 = 0.25;
+
+/// How many vectors ahead the memory is asked for rays.
+const AHEAD: usize = 4;
 
 /// Octants of directions.
 const OCTANTS: usize = 8;
@@ -51,6 +54,7 @@ pub struct Memory<S> {
     local: Chunk<S>,
     best: Best<S>,
     waiting: Vec<walk::Waiting<S>>,
+    pairs: leaf::Pairs,
 }
 
 impl<S: Real> Default for Memory<S> {
@@ -62,6 +66,7 @@ impl<S: Real> Default for Memory<S> {
             local: Chunk::default(),
             best: Best::default(),
             waiting: Vec::new(),
+            pairs: leaf::Pairs::default(),
         }
     }
 }
@@ -109,7 +114,10 @@ impl<S: Real> Job<'_, S> {
     /// many were sorted.
     #[inline(always)]
     fn sort<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
-        let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
+        let rays = self.rays;
+        let columns = rays.org.iter().chain(&rays.dir).chain([&rays.t_min, &rays.t_max]);
+        columns.for_each(|column| prefetch(column, at + AHEAD * V::N));
+        let (packet, t_max, live) = Packet::<V>::load(rays, at);
         if COUNT {
             self.counters.rays += u64::from(live.count_ones());
         }
@@ -160,7 +168,7 @@ impl<S: Real> Job<'_, S> {
     /// Traces what was sorted, chunk by chunk.
     #[inline(always)]
     fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
-        let Memory { bins, ids, chunk, local, best, waiting } = &mut *self.memory;
+        let Memory { bins, ids, chunk, local, best, waiting, pairs } = &mut *self.memory;
         for octant in 0..OCTANTS {
             ids.clear();
             bins[octant..].iter_mut().step_by(OCTANTS).for_each(|alike| ids.append(alike));
@@ -172,7 +180,8 @@ impl<S: Real> Job<'_, S> {
                 chunk.gather::<V>(self.rays, ids, &mut best.t);
                 best.start();
                 let (stack, counters) = (&mut *self.stack, &mut *self.counters);
-                let mut walk = walk::Walk { best: &mut *best, waiting: &mut *waiting, stack, counters };
+                let (waiting, pairs) = (&mut *waiting, &mut *pairs);
+                let mut walk = walk::Walk { best: &mut *best, waiting, pairs, stack, counters };
                 walk.world::<V, ANY, COUNT>(self.world, chunk, local, octant);
                 match &mut self.output {
                     Output::Closest(hits) => best.scatter(hits, ids),

@@ -26,6 +26,8 @@ pub struct Walk<'a, S> {
     pub best: &'a mut Best<S>,
     /// Boxes to visit.
     pub waiting: &'a mut Vec<Waiting<S>>,
+    /// Room for the closer look at a leaf.
+    pub pairs: &'a mut leaf::Pairs,
     /// For kernels that want one.
     pub stack: &'a mut Stack<S>,
     /// Counters.
