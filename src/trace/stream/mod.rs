@@ -53,7 +53,7 @@ pub struct Memory<S> {
     /// The chunk in an instance's space.
     local: Chunk<S>,
     best: Best<S>,
-    waiting: Vec<walk::Waiting<S>>,
+    waiting: walk::Pile<S>,
     pairs: leaf::Pairs,
 }
 
@@ -65,7 +65,7 @@ impl<S: Real> Default for Memory<S> {
             chunk: Chunk::default(),
             local: Chunk::default(),
             best: Best::default(),
-            waiting: Vec::new(),
+            waiting: walk::Pile::default(),
             pairs: leaf::Pairs::default(),
         }
     }
@@ -97,7 +97,6 @@ impl<S: Real> Job<'_, S> {
         &mut self,
         starts: impl Iterator<Item = usize>,
     ) {
-        self.memory.waiting.clear();
         self.memory.waiting.reserve(self.world.stack_bound());
         let mut sorted = 0;
         for at in starts {
