@@ -1,7 +1,9 @@
 //! A chunk of rays of one octant as structures of arrays, and what they have found.
 
 use super::OCTANTS;
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
+use super::bounds::Bounds;
+use crate::lanes::words::transpose_bits;
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real};
 use crate::ray::slab::Interval;
 use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
 use crate::scene::world::Instance;
@@ -42,6 +44,8 @@ pub struct Chunk<S> {
     pub mean: [S; 3],
     /// Number of rays.
     pub len: usize,
+    /// Bounds over all of them, if they are of one octant.
+    pub bounds: Option<Bounds<S>>,
 }
 
 /// The best hits of a chunk so far.
@@ -73,6 +77,7 @@ impl<S: Real> Default for Chunk<S> {
             dominant: [0; 3],
             mean: [S::ZERO; 3],
             len: 0,
+            bounds: None,
         }
     }
 }
@@ -103,11 +108,20 @@ impl<S: Real> Chunk<S> {
             (self.dir[0][i], self.dir[1][i], self.dir[2][i]) = (dx[id], dy[id], dz[id]);
             (self.t_min[i], t[i]) = (t_min[id], t_max[id]);
         }
+        // Whole vectors.
+        let last = self.len - 1;
+        for i in self.len..self.len.next_multiple_of(V::N).min(RAYS) {
+            for axis in 0..3 {
+                (self.org[axis][i], self.dir[axis][i]) = (self.org[axis][last], self.dir[axis][last]);
+            }
+            (self.t_min[i], t[i]) = (self.t_min[last], t[last]);
+        }
         for at in (0..self.len).step_by(V::N) {
             let (org, dir) = (load3::<V>(&self.org, at), load3::<V>(&self.dir, at));
             self.put(at, &Packet::new(org, dir, V::load(&self.t_min[at..])));
         }
-        self.mean = self.sum_of_directions();
+        self.bounds = Some(Bounds::of::<V>(self, t));
+        self.mean = self.sum_of_directions::<V>();
     }
 
     /// The rays of `from` that meet an instance's box before `t`, in its space and at the same places. Returns which.
@@ -119,7 +133,7 @@ impl<S: Real> Chunk<S> {
         t: &[S; RAYS],
         rays: Set,
     ) -> Set {
-        self.len = from.len;
+        (self.len, self.bounds) = (from.len, None);
         let mut inside = 0;
         if rays.count_ones() <= FEW {
             let mut rest = rays;
@@ -132,7 +146,7 @@ impl<S: Real> Chunk<S> {
             for at in (0..self.len).step_by(V::N) {
                 inside |= self.enter_vector::<V>(from, instance, t, at, (rays >> at) as u32 & V::ALL);
             }
-            self.mean = self.sum_of_directions();
+            self.mean = self.sum_of_directions::<V>();
         }
         inside
     }
@@ -163,8 +177,14 @@ impl<S: Real> Chunk<S> {
         Set::from(meets) << at
     }
 
-    fn sum_of_directions(&self) -> [S; 3] {
-        [0, 1, 2].map(|a| self.dir[a][..self.len].iter().fold(S::ZERO, |sum, &d| sum + d))
+    /// About that: entries after the last ray count too, as far as the vectors go.
+    fn sum_of_directions<V: Lanes<Scalar = S>>(&self) -> [S; 3] {
+        [0, 1, 2].map(|a| {
+            let mut sums = [S::ZERO; MAX_LANES];
+            let vectors = (0..self.len).step_by(V::N).map(|at| V::load(&self.dir[a][at..]));
+            vectors.fold(V::constant(0.0), |sum, next| sum + next).store(&mut sums);
+            sums.into_iter().fold(S::ZERO, |sum, next| sum + next)
+        })
     }
 
     /// Puts in what kernels need beside origins and directions.
@@ -178,9 +198,7 @@ impl<S: Real> Chunk<S> {
         let pick = |i: usize| V::select(dominant[0], turned[0][i], V::select(dominant[1], turned[1][i], turned[2][i]));
         store3([0, 1, 2].map(pick), &mut self.around, at);
         let [_, y, z] = packet.dominant;
-        for lane in 0..V::N {
-            self.axis[at + lane] = (y >> lane & 1 | (z >> lane & 1) << 1) as u8;
-        }
+        self.axis[at..at + V::N].copy_from_slice(&transpose_bits([y, z])[..V::N]);
         for (mask, bits) in self.dominant.iter_mut().zip(packet.dominant) {
             *mask = *mask & !(Set::from(V::ALL) << at) | Set::from(bits) << at;
         }

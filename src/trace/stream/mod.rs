@@ -11,6 +11,7 @@
 //! Ray Stream Tracing", 2009; Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray tracing kernels for modern CPU
 //! architectures", 2015.
 
+mod bounds;
 mod chunk;
 mod leaf;
 mod node;

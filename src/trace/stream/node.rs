@@ -29,9 +29,11 @@ impl<S> Met<S> {
     }
 }
 
-/// The planes of all children that rays of `octant` meet first and last, axis by axis.
+/// The planes of all children that rays of one octant meet first and last, axis by axis.
+pub type Planes<'a, S> = [(&'a [S; WIDTH], &'a [S; WIDTH]); 3];
+
 #[inline(always)]
-fn planes<S>(node: &Node<S>, octant: usize) -> [(&[S; WIDTH], &[S; WIDTH]); 3] {
+fn planes<S>(node: &Node<S>, octant: usize) -> Planes<'_, S> {
     [0, 1, 2].map(|axis| {
         let [low, high] = &node.bounds[axis];
         if octant >> axis & 1 == 0 { (low, high) } else { (high, low) }
@@ -103,25 +105,28 @@ fn dense<V: Lanes, const ANY: bool>(
 ) -> Met<V::Scalar> {
     let planes = planes(node, octant);
     let mut met = Met { children: 0, halves: [[0; WIDTH]; 2], near: [V::Scalar::ZERO; WIDTH], bound: false };
-    for at in (0..chunk.len.min(RAYS)).step_by(V::N) {
-        let lanes = (rays >> at) as u32 & V::ALL;
-        if lanes == 0 {
-            continue;
+    let mut rest = chunk.bounds.as_ref().map_or(u32::MAX, |bounds| bounds.children(&planes, octant));
+    rest &= (1 << node.used) - 1;
+    while rest != 0 {
+        let child = rest.trailing_zeros() as usize & (WIDTH - 1);
+        rest &= rest - 1;
+        let corner = planes.map(|(near, far)| (V::splat(near[child]), V::splat(far[child])));
+        let mut meeting = [0u64; 2];
+        for (half, meeting) in meeting.iter_mut().enumerate() {
+            for at in (64 * half..chunk.len.min(64 * half + 64)).step_by(V::N) {
+                let [x, y, z] = [0, 1, 2].map(|a| {
+                    let (org, rcp) = (V::load(&chunk.org[a][at..]), V::load(&chunk.rcp[a][at..]));
+                    ((corner[a].0 - org) * rcp, (corner[a].1 - org) * rcp)
+                });
+                let near = x.0.fast_max(y.0).fast_max(z.0);
+                let interval = Interval { near, far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
+                let meets = interval.meets(V::load(&chunk.t_min[at..]), V::load(&t[at..]));
+                *meeting |= u64::from(meets.bits()) << (at % 64);
+            }
         }
-        let [org, rcp] = [&chunk.org, &chunk.rcp].map(|v| [0, 1, 2].map(|a| V::load(&v[a][at..])));
-        let (t_min, t) = (V::load(&chunk.t_min[at..]), V::load(&t[at..]));
-        for child in 0..WIDTH {
-            let [x, y, z] = [0, 1, 2].map(|a| {
-                let plane = |bounds: &[V::Scalar; WIDTH]| (V::splat(bounds[child]) - org[a]) * rcp[a];
-                (plane(planes[a].0), plane(planes[a].1))
-            });
-            let near = x.0.fast_max(y.0).fast_max(z.0);
-            let interval = Interval { near, far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
-            met.halves[at / 64][child] |= u64::from(interval.meets(t_min, t).bits() & lanes) << (at % 64);
-        }
-    }
-    for child in 0..WIDTH {
-        met.children |= u32::from((met.halves[0][child] | met.halves[1][child]) != 0) << child;
+        let meeting = [meeting[0] & rays as u64, meeting[1] & (rays >> 64) as u64];
+        (met.halves[0][child], met.halves[1][child]) = (meeting[0], meeting[1]);
+        met.children |= u32::from(meeting[0] | meeting[1] != 0) << child;
     }
     if !ANY {
         // How far the near corner lies along the mean direction.
