@@ -5,7 +5,7 @@ use super::bounds::Bounds;
 use crate::lanes::words::transpose_bits;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real};
 use crate::ray::slab::Interval;
-use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
+use crate::ray::{Candidate, HitPacket, Hits, INVALID_ID, Packet, Rays};
 use crate::scene::world::Instance;
 use crate::shape::{Turned, around};
 
@@ -283,6 +283,24 @@ impl<S: Real> Best<S> {
         hit.v.store(&mut self.v[at..]);
         self.prim[at..at + V::N].copy_from_slice(&hit.prim[..V::N]);
         self.inst[at..at + V::N].copy_from_slice(&hit.inst[..V::N]);
+    }
+
+    /// Takes in what a kernel found for one ray. Whether it is nearer is a surprise, so nothing branches on it; ties,
+    /// which are rare, go by [`HitPacket::commit`].
+    #[inline(always)]
+    pub fn take(&mut self, ray: usize, found: &Candidate<S>, prim: u32, inst: u32) {
+        if found.hit && found.t == self.t[ray] {
+            let mut hit = self.packet::<S>(ray);
+            hit.commit(1, found, prim, inst);
+            self.put(ray, &hit);
+            return;
+        }
+        let wins = found.hit & (found.t < self.t[ray]);
+        self.t[ray] = S::select(wins, found.t, self.t[ray]);
+        self.u[ray] = S::select(wins, found.u, self.u[ray]);
+        self.v[ray] = S::select(wins, found.v, self.v[ray]);
+        self.prim[ray] = if wins { prim } else { self.prim[ray] };
+        self.inst[ray] = if wins { inst } else { self.inst[ray] };
     }
 
     /// Writes the hits to their places in a batch.

@@ -11,7 +11,7 @@ use crate::trace::leaf;
 use crate::trace::query::Query;
 
 /// From this many rays in a vector on triangles are tested against it.
-const DENSE: u32 = 5;
+const DENSE: u32 = 8;
 
 /// Tests the block a leaf refers to.
 #[inline(always)]
@@ -125,8 +125,8 @@ impl Pairs {
         table
     };
 
-    /// Adds a ray with the triangles whose bits are set. Always writes eight and takes back those that are too many: how
-    /// many there are is a surprise every time.
+    /// Adds a ray with the triangles whose bits are set. Always writes eight and takes back those that are too many:
+    /// how many there are is a surprise every time.
     #[inline(always)]
     fn add(&mut self, ray: usize, slots: u32) {
         let slots = slots as usize & 0xff;
@@ -170,9 +170,7 @@ fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
         if ANY {
             walk.best.done |= Set::from(found.hit & (found.t <= walk.best.t[ray])) << ray;
         } else {
-            let mut hit = walk.best.packet::<S>(ray);
-            hit.commit(1, &found, block.prim[slot], inst);
-            walk.best.put(ray, &hit);
+            walk.best.take(ray, &found, block.prim[slot], inst);
         }
     }
 }

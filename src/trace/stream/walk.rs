@@ -185,8 +185,8 @@ impl<S: Real> Walk<'_, S> {
         }
     }
 
-    /// The child to visit next with its rays; the others that are met go to the stack, nearest on top. Every child's place
-    /// comes from counting those that are farther: sorting them would mean a surprise per comparison.
+    /// The child to visit next with its rays; the others that are met go to the stack, nearest on top. Every child's
+    /// place comes from counting those that are farther: sorting them would mean a surprise per comparison.
     #[inline(always)]
     fn choose<const ANY: bool>(&mut self, node: &Node<S>, met: &node::Met<S>, fetch: &impl Fn(Child)) -> (Child, Set) {
         let last = met.children.count_ones() as usize - 1;
