@@ -1,9 +1,9 @@
 //! Streams: many rays without a common point through the 8-wide tree together, for what packets are bad at.
 //!
-//! The rays of a batch are sorted by octant and cut into chunks of up to 128. A chunk goes down the tree as one, with a
-//! bit per ray for every box on the stack. At a node few rays are tested one by one against eight boxes, many as vectors
-//! of rays against one box after the other; in both cases a loop of known length replaces the branches of one ray's
-//! own traversal, which are what incoherent rays spend their time on. At a leaf likewise. Vectors of rays that are
+//! The rays of a batch are sorted by octant and cut into chunks of up to 128. A chunk goes down the tree as one, with
+//! a bit per ray for every box on the stack. At a node few rays are tested one by one against eight boxes, many as
+//! vectors of rays against one box after the other; in both cases a loop of known length replaces the branches of one
+//! ray's own traversal, which are what incoherent rays spend their time on. At a leaf likewise. Vectors of rays that are
 //! coherent after all go to the packet kernel. The kernels and so the hits are those of the other generic engines, bit
 //! by bit.
 //!
