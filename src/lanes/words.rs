@@ -182,6 +182,30 @@ fn list_bits_portable(mask: u32, base: u8, list: &mut [u8; 16]) -> usize {
     count
 }
 
+/// Bit planes as numbers: bit `k` of number `i` is bit `i` of `planes[k]`.
+#[inline(always)]
+pub fn transpose_bits<const K: usize>(planes: [u32; K]) -> [u8; 16] {
+    const { assert!(K <= 8) };
+    #[cfg(all(target_feature = "avx512bw", target_feature = "avx512vl"))]
+    {
+        use std::arch::x86_64::{_mm_maskz_set1_epi8, _mm_or_si128, _mm_setzero_si128};
+        // SAFETY: compiled only where the whole build has BW and VL; the instructions touch registers only.
+        let all = unsafe {
+            planes.iter().enumerate().fold(_mm_setzero_si128(), |all, (k, &plane)| {
+                _mm_or_si128(all, _mm_maskz_set1_epi8(plane as u16, (1u8 << k) as i8))
+            })
+        };
+        bytemuck::cast(all)
+    }
+    #[cfg(not(all(target_feature = "avx512bw", target_feature = "avx512vl")))]
+    transpose_bits_portable(planes)
+}
+
+#[cfg(any(test, not(all(target_feature = "avx512bw", target_feature = "avx512vl"))))]
+fn transpose_bits_portable<const K: usize>(planes: [u32; K]) -> [u8; 16] {
+    std::array::from_fn(|i| planes.iter().enumerate().fold(0, |all, (k, plane)| all | ((plane >> i & 1) << k) as u8))
+}
+
 /// Eight words of 64 bits.
 #[derive(Clone, Copy, Debug)]
 pub struct Marks(u64x8);
@@ -330,6 +354,20 @@ mod tests {
                 let mut list = [0xff; 16];
                 let count = list_bits(mask, base, &mut list);
                 assert_eq!(list[..count], want);
+            }
+        }
+    }
+
+    #[test]
+    fn bit_planes_become_numbers() {
+        let mut next = numbers();
+        for _ in 0..200 {
+            let planes: [u32; 5] = std::array::from_fn(|_| next());
+            let got = transpose_bits(planes);
+            assert_eq!(got, transpose_bits_portable(planes));
+            for (i, number) in got.into_iter().enumerate() {
+                let want: String = (0..5).rev().map(|k| if planes[k] >> i & 1 != 0 { '1' } else { '0' }).collect();
+                assert_eq!(format!("{number:05b}"), want);
             }
         }
     }

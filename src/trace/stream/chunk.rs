@@ -1,14 +1,19 @@
 //! A chunk of rays of one octant as structures of arrays, and what they have found.
 
 use super::OCTANTS;
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
+use super::bounds::Bounds;
+use crate::lanes::words::transpose_bits;
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real};
 use crate::ray::slab::Interval;
-use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
+use crate::ray::{Candidate, HitPacket, Hits, INVALID_ID, Packet, Rays};
 use crate::scene::world::Instance;
 use crate::shape::{Turned, around};
 
-/// Most rays in a chunk: one bit each in a word.
-pub const RAYS: usize = 64;
+/// Most rays in a chunk: one bit each in a [`Set`].
+pub const RAYS: usize = 128;
+
+/// A set of rays of a chunk.
+pub type Set = u128;
 
 /// Up to this many rays go into an instance one by one.
 const FEW: u32 = 4;
@@ -34,11 +39,13 @@ pub struct Chunk<S> {
     /// Dominant axis of each ray.
     pub axis: [u8; RAYS],
     /// Rays with each dominant axis.
-    pub dominant: [u64; 3],
+    pub dominant: [Set; 3],
     /// Sum of the directions.
     pub mean: [S; 3],
     /// Number of rays.
     pub len: usize,
+    /// Bounds over all of them, if they are of one octant.
+    pub bounds: Option<Bounds<S>>,
 }
 
 /// The best hits of a chunk so far.
@@ -52,7 +59,7 @@ pub struct Best<S> {
     prim: [u32; RAYS],
     inst: [u32; RAYS],
     /// Any-hit: rays that found something.
-    pub done: u64,
+    pub done: Set,
 }
 
 impl<S: Real> Default for Chunk<S> {
@@ -70,6 +77,7 @@ impl<S: Real> Default for Chunk<S> {
             dominant: [0; 3],
             mean: [S::ZERO; 3],
             len: 0,
+            bounds: None,
         }
     }
 }
@@ -85,22 +93,35 @@ fn store3<V: Lanes>(from: Lanes3<V>, to: &mut [[V::Scalar; RAYS]; 3], at: usize)
 }
 
 impl<S: Real> Chunk<S> {
-    /// Takes rays from a batch.
+    /// Takes at most [`RAYS`] rays from a batch, which is not empty; the ends of their segments go to `t`.
     #[inline(always)]
-    pub fn gather<V: Lanes<Scalar = S>>(&mut self, rays: &Rays<S>, ids: &[u32]) {
-        self.len = ids.len();
-        for (i, &id) in ids.iter().enumerate() {
+    pub fn gather<V: Lanes<Scalar = S>>(&mut self, rays: &Rays<S>, ids: &[u32], t: &mut [S; RAYS]) {
+        self.len = ids.len().min(RAYS);
+        // Columns of one known length, so that a ray's number is looked at once instead of eight times.
+        let n = rays.padded_len();
+        let [ox, oy, oz] = [0, 1, 2].map(|a| &rays.org[a][..n]);
+        let [dx, dy, dz] = [0, 1, 2].map(|a| &rays.dir[a][..n]);
+        let (t_min, t_max) = (&rays.t_min[..n], &rays.t_max[..n]);
+        for (i, &id) in ids.iter().enumerate().take(RAYS) {
+            let id = (id as usize).min(n - 1);
+            (self.org[0][i], self.org[1][i], self.org[2][i]) = (ox[id], oy[id], oz[id]);
+            (self.dir[0][i], self.dir[1][i], self.dir[2][i]) = (dx[id], dy[id], dz[id]);
+            (self.t_min[i], t[i]) = (t_min[id], t_max[id]);
+        }
+        // Whole vectors.
+        let last = self.len - 1;
+        for i in self.len..self.len.next_multiple_of(V::N).min(RAYS) {
             for axis in 0..3 {
-                self.org[axis][i] = rays.org[axis][id as usize];
-                self.dir[axis][i] = rays.dir[axis][id as usize];
+                (self.org[axis][i], self.dir[axis][i]) = (self.org[axis][last], self.dir[axis][last]);
             }
-            self.t_min[i] = rays.t_min[id as usize];
+            (self.t_min[i], t[i]) = (self.t_min[last], t[last]);
         }
         for at in (0..self.len).step_by(V::N) {
             let (org, dir) = (load3::<V>(&self.org, at), load3::<V>(&self.dir, at));
             self.put(at, &Packet::new(org, dir, V::load(&self.t_min[at..])));
         }
-        self.mean = self.sum_of_directions();
+        self.bounds = Some(Bounds::of::<V>(self, t));
+        self.mean = self.sum_of_directions::<V>();
     }
 
     /// The rays of `from` that meet an instance's box before `t`, in its space and at the same places. Returns which.
@@ -110,9 +131,9 @@ impl<S: Real> Chunk<S> {
         from: &Self,
         instance: &Instance<S>,
         t: &[S; RAYS],
-        rays: u64,
-    ) -> u64 {
-        self.len = from.len;
+        rays: Set,
+    ) -> Set {
+        (self.len, self.bounds) = (from.len, None);
         let mut inside = 0;
         if rays.count_ones() <= FEW {
             let mut rest = rays;
@@ -125,7 +146,7 @@ impl<S: Real> Chunk<S> {
             for at in (0..self.len).step_by(V::N) {
                 inside |= self.enter_vector::<V>(from, instance, t, at, (rays >> at) as u32 & V::ALL);
             }
-            self.mean = self.sum_of_directions();
+            self.mean = self.sum_of_directions::<V>();
         }
         inside
     }
@@ -138,7 +159,7 @@ impl<S: Real> Chunk<S> {
         t: &[S; RAYS],
         at: usize,
         lanes: u32,
-    ) -> u64 {
+    ) -> Set {
         if lanes == 0 {
             return 0;
         }
@@ -153,11 +174,17 @@ impl<S: Real> Chunk<S> {
         store3(local.dir, &mut self.dir, at);
         local.t_min.store(&mut self.t_min[at..]);
         self.put(at, &local);
-        u64::from(meets) << at
+        Set::from(meets) << at
     }
 
-    fn sum_of_directions(&self) -> [S; 3] {
-        [0, 1, 2].map(|a| self.dir[a][..self.len].iter().fold(S::ZERO, |sum, &d| sum + d))
+    /// About that: entries after the last ray count too, as far as the vectors go.
+    fn sum_of_directions<V: Lanes<Scalar = S>>(&self) -> [S; 3] {
+        [0, 1, 2].map(|a| {
+            let mut sums = [S::ZERO; MAX_LANES];
+            let vectors = (0..self.len).step_by(V::N).map(|at| V::load(&self.dir[a][at..]));
+            vectors.fold(V::constant(0.0), |sum, next| sum + next).store(&mut sums);
+            sums.into_iter().fold(S::ZERO, |sum, next| sum + next)
+        })
     }
 
     /// Puts in what kernels need beside origins and directions.
@@ -171,11 +198,9 @@ impl<S: Real> Chunk<S> {
         let pick = |i: usize| V::select(dominant[0], turned[0][i], V::select(dominant[1], turned[1][i], turned[2][i]));
         store3([0, 1, 2].map(pick), &mut self.around, at);
         let [_, y, z] = packet.dominant;
-        for lane in 0..V::N {
-            self.axis[at + lane] = (y >> lane & 1 | (z >> lane & 1) << 1) as u8;
-        }
+        self.axis[at..at + V::N].copy_from_slice(&transpose_bits([y, z])[..V::N]);
         for (mask, bits) in self.dominant.iter_mut().zip(packet.dominant) {
-            *mask = *mask & !(u64::from(V::ALL) << at) | u64::from(bits) << at;
+            *mask = *mask & !(Set::from(V::ALL) << at) | Set::from(bits) << at;
         }
     }
 
@@ -202,7 +227,7 @@ impl<S: Real> Chunk<S> {
     }
 
     /// Rays by octant.
-    pub fn octants(&self, rays: u64) -> [u64; OCTANTS] {
+    pub fn octants(&self, rays: Set) -> [Set; OCTANTS] {
         let mut masks = [0; OCTANTS];
         let mut rest = rays;
         while rest != 0 {
@@ -223,12 +248,10 @@ impl<S: Real> Default for Best<S> {
 }
 
 impl<S: Real> Best<S> {
-    /// Nothing found yet.
+    /// Nothing found yet, once the ends of the segments are there.
     #[inline(always)]
-    pub fn start(&mut self, rays: &Rays<S>, ids: &[u32]) {
-        for (t, &id) in self.t.iter_mut().zip(ids) {
-            *t = rays.t_max[id as usize];
-        }
+    pub fn start(&mut self) {
+        (self.u, self.v) = ([S::ZERO; RAYS], [S::ZERO; RAYS]);
         self.prim = [INVALID_ID; RAYS];
         self.inst = [INVALID_ID; RAYS];
         self.done = 0;
@@ -236,9 +259,10 @@ impl<S: Real> Best<S> {
 
     /// Rays whose segments, as far as they are still looked at, reach to `near`.
     #[inline(always)]
-    pub fn reaching<V: Lanes<Scalar = S>>(&self, near: S) -> u64 {
+    pub fn reaching<V: Lanes<Scalar = S>>(&self, near: S) -> Set {
         let near = V::splat(near);
-        (0..RAYS).step_by(V::N).fold(0, |all, at| all | u64::from(near.cmp_le(V::load(&self.t[at..])).bits()) << at)
+        let reach = |at: usize| Set::from(near.cmp_le(V::load(&self.t[at..])).bits()) << at;
+        (0..RAYS).step_by(V::N).fold(0, |all, at| all | reach(at))
     }
 
     /// The hits of rays `at..at + N`.
@@ -261,21 +285,45 @@ impl<S: Real> Best<S> {
         self.inst[at..at + V::N].copy_from_slice(&hit.inst[..V::N]);
     }
 
-    /// Writes the hits to their places in a batch, whose hits are misses so far.
+    /// Takes in what a kernel found for one ray. Whether it is nearer is a surprise, so nothing branches on it; ties,
+    /// which are rare, go by [`HitPacket::commit`].
+    #[inline(always)]
+    pub fn take(&mut self, ray: usize, found: &Candidate<S>, prim: u32, inst: u32) {
+        if found.hit && found.t == self.t[ray] {
+            let mut hit = self.packet::<S>(ray);
+            hit.commit(1, found, prim, inst);
+            self.put(ray, &hit);
+            return;
+        }
+        let wins = found.hit & (found.t < self.t[ray]);
+        self.t[ray] = S::select(wins, found.t, self.t[ray]);
+        self.u[ray] = S::select(wins, found.u, self.u[ray]);
+        self.v[ray] = S::select(wins, found.v, self.v[ray]);
+        self.prim[ray] = if wins { prim } else { self.prim[ray] };
+        self.inst[ray] = if wins { inst } else { self.inst[ray] };
+    }
+
+    /// Writes the hits to their places in a batch.
     #[inline(always)]
     pub fn scatter(&self, hits: &mut Hits<S>, ids: &[u32]) {
-        for (i, &id) in ids.iter().enumerate().filter(|&(i, _)| self.prim[i] != INVALID_ID) {
-            let id = id as usize;
-            (hits.t[id], hits.u[id], hits.v[id]) = (self.t[i], self.u[i], self.v[i]);
-            (hits.prim[id], hits.inst[id]) = (self.prim[i], self.inst[i]);
+        let n = hits.t.len();
+        let (t, u, v) = (&mut hits.t[..n], &mut hits.u[..n], &mut hits.v[..n]);
+        let (prim, inst) = (&mut hits.prim[..n], &mut hits.inst[..n]);
+        for (i, &id) in ids.iter().enumerate().take(RAYS) {
+            let id = (id as usize).min(n - 1);
+            t[id] = if self.prim[i] == INVALID_ID { S::INFINITY } else { self.t[i] };
+            (u[id], v[id], prim[id], inst[id]) = (self.u[i], self.v[i], self.prim[i], self.inst[i]);
         }
     }
 
-    /// Writes what any-hit found.
+    /// Writes what any-hit found where it found something.
     #[inline(always)]
     pub fn scatter_done(&self, out: &mut [u8], ids: &[u32]) {
-        for (i, &id) in ids.iter().enumerate() {
-            out[id as usize] = (self.done >> i & 1) as u8;
+        let mut rest = self.done;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            out[ids[i] as usize] = 1;
         }
     }
 }

@@ -1,17 +1,17 @@
 //! Leaves: a chunk's rays against one block of primitives.
 
-use super::chunk::{Chunk, RAYS};
+use super::chunk::{Chunk, RAYS, Set};
 use super::walk::Walk;
 use crate::bvh::Child;
 use crate::lanes::{Lanes, Real};
 use crate::ray::{HitPacket, Packet};
 use crate::scene::world::{Class, Object};
-use crate::shape::Triangle;
+use crate::shape::{BLOCK, Triangle};
 use crate::trace::leaf;
 use crate::trace::query::Query;
 
 /// From this many rays in a vector on triangles are tested against it.
-const DENSE: u32 = 5;
+const DENSE: u32 = 8;
 
 /// Tests the block a leaf refers to.
 #[inline(always)]
@@ -21,7 +21,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
     chunk: &Chunk<V::Scalar>,
     walk: &mut Walk<V::Scalar>,
     child: Child,
-    rays: u64,
+    rays: Set,
 ) {
     let kernel = |packet: &Packet<V>, query: &mut Query<V, ANY, COUNT>, lanes: u32| {
         leaf::block(object, inst, packet, query, child, lanes);
@@ -33,12 +33,16 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
     let mut few = rays;
     if rays.count_ones() >= DENSE {
         for at in (0..chunk.len).step_by(V::N) {
+            let lanes = (rays >> at) as u32 & V::ALL;
+            if lanes.count_ones() < DENSE {
+                continue;
+            }
             // A vector tests rays of one dominant axis at once.
             for dominant in chunk.dominant {
-                let lanes = (rays & dominant) >> at & u64::from(V::ALL);
+                let lanes = lanes & (dominant >> at) as u32;
                 if lanes.count_ones() >= DENSE {
-                    few &= !(lanes << at);
-                    vector(chunk, walk, at, lanes as u32, kernel);
+                    few &= !(Set::from(lanes) << at);
+                    vector(chunk, walk, at, lanes, kernel);
                 }
             }
         }
@@ -53,7 +57,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
 pub fn vectors<V: Lanes, const ANY: bool, const COUNT: bool>(
     chunk: &Chunk<V::Scalar>,
     walk: &mut Walk<V::Scalar>,
-    rays: u64,
+    rays: Set,
     kernel: impl Fn(&Packet<V>, &mut Query<V, ANY, COUNT>, u32),
 ) {
     for at in (0..chunk.len).step_by(V::N) {
@@ -79,13 +83,62 @@ fn vector<V: Lanes, const ANY: bool, const COUNT: bool>(
     kernel(&packet, &mut query, lanes);
     let (hit, done) = (query.hit, query.done);
     if ANY {
-        walk.best.done |= u64::from(done) << at;
+        walk.best.done |= Set::from(done) << at;
     } else {
         walk.best.put(at, &hit);
     }
 }
 
-/// One ray after the other against all triangles of the block.
+/// Rays of a chunk with triangles of a block that are to be looked at closer.
+#[derive(Clone, Debug)]
+pub struct Pairs {
+    ray: [u8; Self::ROOM],
+    slot: [u8; Self::ROOM],
+    len: usize,
+}
+
+impl Default for Pairs {
+    fn default() -> Self {
+        Self { ray: [0; Self::ROOM], slot: [0; Self::ROOM], len: 0 }
+    }
+}
+
+impl Pairs {
+    /// Every ray with every triangle, and what is written past the last of them.
+    const ROOM: usize = (RAYS + 1) * BLOCK;
+
+    /// The set bits of each byte, ascending, then zeros.
+    const SET_BITS: [[u8; BLOCK]; 256] = {
+        let mut table = [[0; BLOCK]; 256];
+        let mut mask = 0;
+        while mask < 256 {
+            let (mut bit, mut count) = (0, 0);
+            while bit < BLOCK {
+                if mask >> bit & 1 != 0 {
+                    table[mask][count] = bit as u8;
+                    count += 1;
+                }
+                bit += 1;
+            }
+            mask += 1;
+        }
+        table
+    };
+
+    /// Adds a ray with the triangles whose bits are set. Always writes eight and takes back those that are too many:
+    /// how many there are is a surprise every time.
+    #[inline(always)]
+    fn add(&mut self, ray: usize, slots: u32) {
+        let slots = slots as usize & 0xff;
+        let at = self.len.min(Self::ROOM - BLOCK);
+        self.ray[at..at + BLOCK].copy_from_slice(&[ray as u8; BLOCK]);
+        self.slot[at..at + BLOCK].copy_from_slice(&Self::SET_BITS[slots]);
+        self.len = at + slots.count_ones() as usize;
+    }
+}
+
+/// One ray after the other against all triangles of the block; then, pair by pair, a closer look at those that it may
+/// hit.
 #[inline(always)]
 fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
     object: &Object<S>,
@@ -93,39 +146,31 @@ fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
     chunk: &Chunk<S>,
     walk: &mut Walk<S>,
     child: Child,
-    mut rays: u64,
+    mut rays: Set,
 ) {
     let block = &object.triangles[child.index as usize];
     let slots = (1 << child.count) - 1;
+    walk.pairs.len = 0;
     while rays != 0 {
-        let i = rays.trailing_zeros();
+        let ray = rays.trailing_zeros() as usize & (RAYS - 1);
         rays &= rays - 1;
-        let ray = i as usize & (RAYS - 1);
-        let turned = chunk.turned(ray);
-        let mut maybe = slots & Triangle::candidates(&turned, chunk.t_min[ray], walk.best.t[ray], block);
+        let maybe = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], walk.best.t[ray], block);
+        walk.pairs.add(ray, slots & maybe);
         if COUNT {
             walk.counters.leaves += 1;
             walk.counters.prims += u64::from(child.count);
             walk.counters.prim_lanes_active += u64::from(child.count);
             walk.counters.prim_lanes_total += u64::from(child.count);
         }
-        while maybe != 0 {
-            let slot = maybe.trailing_zeros() as usize & 7;
-            maybe &= maybe - 1;
-            let found = Triangle::look_closer(&chunk.packet::<S>(ray), &turned, &block.get(slot));
-            if !found.hit {
-                continue;
-            }
-            if ANY {
-                if found.t <= walk.best.t[ray] {
-                    walk.best.done |= 1 << i;
-                    break;
-                }
-            } else {
-                let mut hit = walk.best.packet::<S>(ray);
-                hit.commit(1, &found, block.prim[slot], inst);
-                walk.best.put(ray, &hit);
-            }
+    }
+    for at in 0..walk.pairs.len.min(Pairs::ROOM) {
+        let ray = usize::from(walk.pairs.ray[at]) & (RAYS - 1);
+        let slot = usize::from(walk.pairs.slot[at]) & (BLOCK - 1);
+        let found = Triangle::look_closer(&chunk.packet::<S>(ray), &chunk.turned(ray), &block.get(slot));
+        if ANY {
+            walk.best.done |= Set::from(found.hit & (found.t <= walk.best.t[ray])) << ray;
+        } else {
+            walk.best.take(ray, &found, block.prim[slot], inst);
         }
     }
 }

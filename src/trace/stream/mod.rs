@@ -1,16 +1,17 @@
 //! Streams: many rays without a common point through the 8-wide tree together, for what packets are bad at.
 //!
-//! The rays of a batch are sorted by octant and cut into chunks of up to 64. A chunk goes down the tree as one, with a
-//! bit per ray for every box on the stack. At a node few rays are tested one by one against eight boxes, many as vectors
-//! of rays against one box after the other; in both cases a loop of known length replaces the branches of one ray's
-//! own traversal, which are what incoherent rays spend their time on. At a leaf likewise. Vectors of rays that are
-//! coherent after all go to the packet kernel. The kernels and so the hits are those of the other generic engines, bit
-//! by bit.
+//! The rays of a batch are sorted by octant and cut into chunks of up to 128. A chunk goes down the tree as one, with
+//! a bit per ray for every box on the stack. At a node few rays are tested one by one against eight boxes, many as
+//! vectors of rays against one box after the other; in both cases a loop of known length replaces the branches of one
+//! ray's own traversal, which are what incoherent rays spend their time on. At a leaf likewise. Vectors of rays that
+//! are coherent after all go to the packet kernel. The kernels and so the hits are those of the other generic engines,
+//! bit by bit.
 //!
 //! Sources: Wald, Gribble, Boulos, Kensler, "SIMD Ray Stream Tracing", 2007; Tsakok, "Faster Incoherent Rays: Multi-BVH
 //! Ray Stream Tracing", 2009; Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray tracing kernels for modern CPU
 //! architectures", 2015.
 
+mod bounds;
 mod chunk;
 mod leaf;
 mod node;
@@ -21,6 +22,7 @@ use std::marker::PhantomData;
 use super::output::Output;
 use super::query::{Query, Stack};
 use super::{Engine, Engines, Scratch, traverse};
+use crate::lanes::words::{prefetch, transpose_bits};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
@@ -32,21 +34,28 @@ const SOURCE: usize = 1024;
 /// Widest range of the slopes of rays that are traced as a packet.
 const SPREAD: f64 = 0.25;
 
+/// How many vectors ahead the memory is asked for rays.
+const AHEAD: usize = 4;
+
 /// Octants of directions.
 const OCTANTS: usize = 8;
+
+/// Octants times dominant axes, the latter rounded up to a power of two.
+const KEYS: usize = 4 * OCTANTS;
 
 /// Working memory of the engine.
 #[derive(Clone, Debug)]
 pub struct Memory<S> {
-    /// Numbers of the rays of each octant, along each dominant axis.
-    bins: [[Vec<u32>; 3]; OCTANTS],
+    /// Numbers of the rays of each octant along each dominant axis: octants along x, then along y, then along z.
+    bins: [Vec<u32>; KEYS],
     /// Those of one octant, along x, then y, then z.
     ids: Vec<u32>,
     chunk: Chunk<S>,
     /// The chunk in an instance's space.
     local: Chunk<S>,
     best: Best<S>,
-    waiting: Vec<walk::Waiting<S>>,
+    waiting: walk::Pile<S>,
+    pairs: leaf::Pairs,
 }
 
 impl<S: Real> Default for Memory<S> {
@@ -57,7 +66,8 @@ impl<S: Real> Default for Memory<S> {
             chunk: Chunk::default(),
             local: Chunk::default(),
             best: Best::default(),
-            waiting: Vec::new(),
+            waiting: walk::Pile::default(),
+            pairs: leaf::Pairs::default(),
         }
     }
 }
@@ -88,7 +98,6 @@ impl<S: Real> Job<'_, S> {
         &mut self,
         starts: impl Iterator<Item = usize>,
     ) {
-        self.memory.waiting.clear();
         self.memory.waiting.reserve(self.world.stack_bound());
         let mut sorted = 0;
         for at in starts {
@@ -105,48 +114,74 @@ impl<S: Real> Job<'_, S> {
     /// many were sorted.
     #[inline(always)]
     fn sort<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
-        let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
+        let rays = self.rays;
+        let columns = rays.org.iter().chain(&rays.dir).chain([&rays.t_min, &rays.t_max]);
+        columns.for_each(|column| prefetch(column, at + AHEAD * V::N));
+        let (packet, t_max, live) = Packet::<V>::load(rays, at);
         if COUNT {
             self.counters.rays += u64::from(live.count_ones());
         }
-        let backward = packet.rcp.map(|r| r.cmp_lt(V::constant(0.0)).bits());
-        if coherent(&packet, backward, live) {
-            let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
-            if live != 0 {
-                traverse::world(self.world, &packet, &mut query, live);
-            }
-            let (hit, done) = (query.hit, query.done);
-            self.output.put(at, &hit, done);
+        // The sign of the reciprocal, without a division.
+        let backward = packet.dir.map(|d| d.cmp_le(V::splat(-S::MIN_POSITIVE)).bits());
+        let uniform = |bits: u32| bits & live == 0 || bits & live == live;
+        let [_, y, z] = packet.dominant;
+        let alike = backward.into_iter().chain([y, z]).all(uniform);
+        if live != 0 && alike && self.packet::<V, ANY, COUNT>(at, live) {
             return 0;
         }
-        self.output.put(at, &HitPacket::<V>::new(t_max), 0);
+        match &mut self.output {
+            Output::Closest(hits) if live != V::ALL => HitPacket::<V>::new(t_max).store(hits, at),
+            Output::Closest(_) => {}
+            Output::Any(out) => out.iter_mut().skip(at).take(V::N).for_each(|out| *out = 0),
+        }
+        let keys = transpose_bits([backward[0], backward[1], backward[2], y, z]);
         let mut rest = live;
         while rest != 0 {
             let lane = rest.trailing_zeros();
             rest &= rest - 1;
-            let octant = (0..3).fold(0, |o, axis| o | (backward[axis] >> lane & 1) << axis);
-            let axis = (packet.dominant[1] >> lane & 1 | (packet.dominant[2] >> lane & 1) << 1) as usize;
-            self.memory.bins[octant as usize & (OCTANTS - 1)][axis].push(at as u32 + lane);
+            let key = usize::from(keys[lane as usize % keys.len()]);
+            self.memory.bins[key % KEYS].push(at as u32 + lane);
         }
         live.count_ones() as usize
+    }
+
+    /// Traces the `live` rays of one octant and dominant axis that start at `at` as a packet, if they point nearly the
+    /// same way; otherwise returns false.
+    #[inline(never)]
+    fn packet<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize, live: u32) -> bool {
+        let (packet, t_max, _) = Packet::<V>::load(self.rays, at);
+        let spread = |slope: V| {
+            let (low, high) = slope.range(live);
+            high - low
+        };
+        let most = V::Scalar::from_f64(SPREAD);
+        if !(spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most) {
+            return false;
+        }
+        let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
+        traverse::world(self.world, &packet, &mut query, live);
+        let (hit, done) = (query.hit, query.done);
+        self.output.put(at, &hit, done);
+        true
     }
 
     /// Traces what was sorted, chunk by chunk.
     #[inline(always)]
     fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
-        let Memory { bins, ids, chunk, local, best, waiting } = &mut *self.memory;
-        for (octant, bins) in bins.iter_mut().enumerate() {
+        let Memory { bins, ids, chunk, local, best, waiting, pairs } = &mut *self.memory;
+        for octant in 0..OCTANTS {
             ids.clear();
-            bins.iter_mut().for_each(|alike| ids.append(alike));
+            bins[octant..].iter_mut().step_by(OCTANTS).for_each(|alike| ids.append(alike));
             let mut rest = &ids[..];
             while !rest.is_empty() {
                 // Chunks of nearly equal sizes.
                 let (ids, others) = rest.split_at(rest.len().div_ceil(rest.len().div_ceil(RAYS)));
                 rest = others;
-                chunk.gather::<V>(self.rays, ids);
-                best.start(self.rays, ids);
+                chunk.gather::<V>(self.rays, ids, &mut best.t);
+                best.start();
                 let (stack, counters) = (&mut *self.stack, &mut *self.counters);
-                let mut walk = walk::Walk { best: &mut *best, waiting: &mut *waiting, stack, counters };
+                let (waiting, pairs) = (&mut *waiting, &mut *pairs);
+                let mut walk = walk::Walk { best: &mut *best, waiting, pairs, stack, counters };
                 walk.world::<V, ANY, COUNT>(self.world, chunk, local, octant);
                 match &mut self.output {
                     Output::Closest(hits) => best.scatter(hits, ids),
@@ -155,21 +190,6 @@ impl<S: Real> Job<'_, S> {
             }
         }
     }
-}
-
-/// Whether the packet kernel is the better one for these rays: one octant, one dominant axis, nearly one direction.
-#[inline(always)]
-fn coherent<V: Lanes>(packet: &Packet<V>, backward: [u32; 3], live: u32) -> bool {
-    let uniform = backward.iter().all(|bits| bits & live == 0 || bits & live == live);
-    if !uniform || !packet.dominant.iter().any(|bits| bits & live == live) {
-        return false;
-    }
-    let spread = |slope: V| {
-        let (low, high) = slope.range(live);
-        high - low
-    };
-    let most = V::Scalar::from_f64(SPREAD);
-    live == 0 || (spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most)
 }
 
 impl<V: Lanes> Engine<V::Scalar> for Stream<V>

@@ -1,10 +1,10 @@
 //! A chunk's way through the trees.
 
-use super::chunk::{Best, Chunk, RAYS};
+use super::chunk::{Best, Chunk, RAYS, Set};
 use super::{leaf, node};
 use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::words::prefetch_either;
-use crate::lanes::{Lanes, Real};
+use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Counters;
 use crate::scene::world::{Object, World};
 use crate::trace::leaf as packet_leaf;
@@ -12,12 +12,50 @@ use crate::trace::query::Stack;
 
 /// What waits to be visited: a box and the rays that meet it.
 #[derive(Clone, Copy, Debug)]
-pub struct Waiting<S> {
-    rays: u64,
+struct Waiting<S> {
+    rays: Set,
     /// Order, and if `bound`, where the first ray enters.
     near: S,
     bound: bool,
     child: Child,
+}
+
+/// The boxes that wait to be visited.
+#[derive(Clone, Debug)]
+pub struct Pile<S> {
+    entries: Vec<Waiting<S>>,
+    len: usize,
+}
+
+impl<S: Real> Default for Pile<S> {
+    fn default() -> Self {
+        Self { entries: Vec::new(), len: 0 }
+    }
+}
+
+impl<S: Real> Pile<S> {
+    /// Makes room for `bound` entries.
+    pub fn reserve(&mut self, bound: usize) {
+        self.len = 0;
+        let none = Waiting { rays: 0, near: S::ZERO, bound: false, child: Child::ROOT };
+        self.entries.resize(self.entries.len().max(bound + WIDTH), none);
+    }
+
+    /// The places above the top, at least [`WIDTH`].
+    #[inline(always)]
+    fn room(&mut self) -> &mut [Waiting<S>] {
+        &mut self.entries[self.len..]
+    }
+
+    /// Takes the top entry if there are more than `base`.
+    #[inline(always)]
+    fn pop(&mut self, base: usize) -> Option<Waiting<S>> {
+        if self.len <= base {
+            return None;
+        }
+        self.len -= 1;
+        Some(self.entries[self.len])
+    }
 }
 
 /// The state of a chunk's query.
@@ -25,7 +63,9 @@ pub struct Walk<'a, S> {
     /// What was found.
     pub best: &'a mut Best<S>,
     /// Boxes to visit.
-    pub waiting: &'a mut Vec<Waiting<S>>,
+    pub waiting: &'a mut Pile<S>,
+    /// Room for the closer look at a leaf.
+    pub pairs: &'a mut leaf::Pairs,
     /// For kernels that want one.
     pub stack: &'a mut Stack<S>,
     /// Counters.
@@ -41,7 +81,7 @@ impl<S: Real> Walk<'_, S> {
         local: &mut Chunk<S>,
         octant: usize,
     ) {
-        let all = u64::MAX >> (RAYS - chunk.len);
+        let all = Set::MAX >> (RAYS - chunk.len);
         if world.is_single_object() {
             let object = &world.objects[world.instances[0].object as usize];
             self.object::<V, ANY, COUNT>(object, 0, chunk, all, octant);
@@ -67,7 +107,7 @@ impl<S: Real> Walk<'_, S> {
         inst: u32,
         (chunk, octant): (&Chunk<S>, usize),
         local: &mut Chunk<S>,
-        rays: u64,
+        rays: Set,
     ) {
         let instance = &world.instances[inst as usize];
         let object = &world.objects[instance.object as usize];
@@ -86,7 +126,7 @@ impl<S: Real> Walk<'_, S> {
         object: &Object<S>,
         inst: u32,
         chunk: &Chunk<S>,
-        rays: u64,
+        rays: Set,
         octant: usize,
     ) {
         if object.has_unbounded() {
@@ -107,15 +147,15 @@ impl<S: Real> Walk<'_, S> {
         &mut self,
         tree: &Tree<S>,
         chunk: &Chunk<S>,
-        rays: u64,
+        rays: Set,
         octant: usize,
         fetch: &impl Fn(Child),
-        mut leaf: impl FnMut(&mut Self, Child, u64),
+        mut leaf: impl FnMut(&mut Self, Child, Set),
     ) {
         if tree.nodes.is_empty() {
             return;
         }
-        let base = self.waiting.len();
+        let base = self.waiting.len;
         let (mut child, mut rays) = (Child::ROOT, rays);
         loop {
             if ANY {
@@ -137,10 +177,7 @@ impl<S: Real> Walk<'_, S> {
             } else if rays != 0 {
                 leaf(self, child, rays);
             }
-            if self.waiting.len() == base {
-                return;
-            }
-            let Some(next) = self.waiting.pop() else { return };
+            let Some(next) = self.waiting.pop(base) else { return };
             (child, rays) = (next.child, next.rays);
             if !ANY && next.bound {
                 rays &= self.best.reaching::<V>(next.near);
@@ -148,42 +185,35 @@ impl<S: Real> Walk<'_, S> {
         }
     }
 
-    /// The child to visit next with its rays; the others that are met go to the stack, nearest on top.
+    /// The child to visit next with its rays; the others that are met go to the stack, nearest on top. Every child's
+    /// place comes from counting those that are farther: sorting them would mean a surprise per comparison.
     #[inline(always)]
-    fn choose<const ANY: bool>(&mut self, node: &Node<S>, met: &node::Met<S>, fetch: &impl Fn(Child)) -> (Child, u64) {
-        let entry = |slot: usize| {
+    fn choose<const ANY: bool>(&mut self, node: &Node<S>, met: &node::Met<S>, fetch: &impl Fn(Child)) -> (Child, Set) {
+        let last = met.children.count_ones() as usize - 1;
+        // No NaNs, so that no two children get one place.
+        let near = S::Octo::load(&met.near).fast_max(S::Octo::splat(S::LOWEST));
+        let farther: [u32; WIDTH] = std::array::from_fn(|slot| {
+            let before = (1 << slot) - 1;
+            if ANY {
+                // In the node's own order, large children first.
+                return !before << 1;
+            }
+            let own = S::Octo::splat(met.near[slot]).fast_max(S::Octo::splat(S::LOWEST));
+            own.cmp_lt(near).bits() & !before | own.cmp_le(near).bits() & before
+        });
+        let places = &mut self.waiting.room()[..WIDTH];
+        let mut next = 0;
+        let mut rest = met.children;
+        while rest != 0 {
+            let slot = rest.trailing_zeros() as usize & (WIDTH - 1);
+            rest &= rest - 1;
             let child = node.child(slot);
             fetch(child);
-            Waiting { rays: met.rays[slot], near: met.near[slot], bound: met.bound, child }
-        };
-        let mut rest = met.children;
-        if ANY {
-            // In the node's own order, large children first.
-            while rest & (rest - 1) != 0 {
-                let slot = (31 - rest.leading_zeros()) as usize & 7;
-                rest &= !(1 << slot);
-                self.waiting.push(entry(slot));
-            }
-            let next = entry(rest.trailing_zeros() as usize & 7);
-            return (next.child, next.rays);
+            let place = (farther[slot] & met.children).count_ones() as usize & (WIDTH - 1);
+            next = if place == last { slot } else { next };
+            places[place] = Waiting { rays: met.rays(slot), near: met.near[slot], bound: met.bound, child };
         }
-        let mut best = entry(rest.trailing_zeros() as usize & 7);
-        rest &= rest - 1;
-        let first = self.waiting.len();
-        while rest != 0 {
-            let other = entry(rest.trailing_zeros() as usize & 7);
-            rest &= rest - 1;
-            let nearer = other.near < best.near;
-            let far = if nearer { best } else { other };
-            best = if nearer { other } else { best };
-            self.waiting.push(far);
-            let mut at = self.waiting.len() - 1;
-            while at > first && self.waiting[at - 1].near < far.near {
-                self.waiting[at] = self.waiting[at - 1];
-                at -= 1;
-            }
-            self.waiting[at] = far;
-        }
-        (best.child, best.rays)
+        self.waiting.len += last;
+        (node.child(next), met.rays(next))
     }
 }
