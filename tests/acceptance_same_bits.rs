@@ -52,7 +52,7 @@ fn same_bits<S: Engines>(scene: &str, size: (u32, u32)) {
             let mut want: Option<(u64, u64)> = None;
             for tile in TILES {
                 let batches = cut::<S>(&rays, tile);
-                for name in ["scalar", "packet4", "packet8", "packet16"] {
+                for name in ["scalar", "packet4", "packet8", "packet16", "stream"] {
                     for workers in &workers {
                         let mut answers = Answers::new(query, &batches);
                         workers.pass(engine::<S>(name).expect("an engine"), &world, &batches, &mut answers);

@@ -187,6 +187,17 @@ impl<S: Real> World<S> {
         matches!(&self.instances[..], [only] if only.identity)
     }
 
+    /// Whether shapes and solids make up more of the objects than triangles do, block by block.
+    pub fn is_of_shapes(&self) -> bool {
+        let (mut triangles, mut shapes) = (0, 0);
+        for o in &self.objects {
+            triangles += o.triangles.len();
+            shapes += o.spheres.len() + o.solids.len() + o.unbounded.len();
+            shapes += o.placed.iter().map(Vec::len).sum::<usize>();
+        }
+        shapes > triangles
+    }
+
     /// Finite world bounds (lower and upper corner) of all bounded geometry; `None` if there is none.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let mut all = Aabb::<S>::EMPTY;

@@ -99,9 +99,12 @@ impl<S: Real> Job<'_, S> {
         starts: impl Iterator<Item = usize>,
     ) {
         self.memory.waiting.reserve(self.world.stack_bound());
+        // Packets test a shape in all lanes at once, chunks ray by ray. Rays that only ask whether there is anything are
+        // done too soon for chunks to make up for that.
+        let packets = ANY && self.world.is_of_shapes();
         let mut sorted = 0;
         for at in starts {
-            sorted += self.sort::<V, ANY, COUNT>(at);
+            sorted += self.sort::<V, ANY, COUNT>(at, packets);
             if sorted + V::N > SOURCE {
                 self.sorted::<V, ANY, COUNT>();
                 sorted = 0;
@@ -110,10 +113,10 @@ impl<S: Real> Job<'_, S> {
         self.sorted::<V, ANY, COUNT>();
     }
 
-    /// Traces a vector of coherent rays as a packet, or sorts its live rays by octant and dominant axis. Returns how
+    /// Traces a vector of coherent rays (of any with `packets`) as a packet, or sorts its live rays by octant and dominant axis. Returns how
     /// many were sorted.
     #[inline(always)]
-    fn sort<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
+    fn sort<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize, packets: bool) -> usize {
         let rays = self.rays;
         let columns = rays.org.iter().chain(&rays.dir).chain([&rays.t_min, &rays.t_max]);
         columns.for_each(|column| prefetch(column, at + AHEAD * V::N));
@@ -125,8 +128,8 @@ impl<S: Real> Job<'_, S> {
         let backward = packet.dir.map(|d| d.cmp_le(V::splat(-S::MIN_POSITIVE)).bits());
         let uniform = |bits: u32| bits & live == 0 || bits & live == live;
         let [_, y, z] = packet.dominant;
-        let alike = backward.into_iter().chain([y, z]).all(uniform);
-        if live != 0 && alike && self.packet::<V, ANY, COUNT>(at, live) {
+        let alike = packets || backward.into_iter().chain([y, z]).all(uniform);
+        if live != 0 && alike && self.packet::<V, ANY, COUNT>(at, live, packets) {
             return 0;
         }
         match &mut self.output {
@@ -146,16 +149,21 @@ impl<S: Real> Job<'_, S> {
     }
 
     /// Traces the `live` rays of one octant and dominant axis that start at `at` as a packet, if they point nearly the
-    /// same way; otherwise returns false.
+    /// same way; otherwise returns false. With `packets`, traces any rays.
     #[inline(never)]
-    fn packet<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize, live: u32) -> bool {
+    fn packet<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        at: usize,
+        live: u32,
+        packets: bool,
+    ) -> bool {
         let (packet, t_max, _) = Packet::<V>::load(self.rays, at);
         let spread = |slope: V| {
             let (low, high) = slope.range(live);
             high - low
         };
         let most = V::Scalar::from_f64(SPREAD);
-        if !(spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most) {
+        if !packets && !(spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most) {
             return false;
         }
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);

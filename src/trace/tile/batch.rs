@@ -4,8 +4,10 @@
 //! With q the corners relative to the ray at each corner's depth, an edge function is q x q' in the picture plane.
 //! Seen from the apex it is linear in (s, t), so it is set up once per triangle and costs two operations per ray.
 //!
-//! **Watertight.** Rounding may show a ray outside of two neighbours, or of every triangle around a corner, so the tile's
-//! own edge functions count as inside down to minus their rounding error: no ray passes between triangles.
+//! **Watertight.** Rounding may show a ray outside of two neighbours, or of every triangle around a corner, or inside
+//! beyond the corner of two nearly parallel edges. So where one of the tile's own edge functions is as small as its
+//! rounding error, on either side, the ray is looked at again in f64: no ray passes between triangles, none hits what
+//! it passes beside.
 //!
 //! **Accuracy** of the tile's own answers: they are exact for corners moved by a few half ulps of their distance. Edges
 //! that f32 cannot place so well (slivers) are looked at again in f64; the normal is taken without cancellation, and
@@ -87,10 +89,8 @@ pub struct Planes {
     pub farthest: [f32; BATCH],
     /// Own answers: what was added to the edge functions.
     pub eps: [[f32; BATCH]; 3],
-    /// Own answers: beyond this, an edge function (with what was added to it) is surely positive.
-    pub doubt: [f32; BATCH],
-    /// Own answers: least and greatest s and t of the corners, and a little more.
-    pub rect: [[[f32; BATCH]; 2]; 2],
+    /// Own answers: from here on an edge function (with what was added to it) is surely positive.
+    pub sure: [f32; BATCH],
     /// Any-hit: the first corner and the normal that points away from the apex, in the axes of the geometry and
     /// the scale of the frame.
     pub side: [[f32; BATCH]; 6],
@@ -98,7 +98,7 @@ pub struct Planes {
     pub wild: u32,
     /// Own answers: triangles whose edges need more digits, bit by triangle.
     pub unsteady: u32,
-    /// Where there are any: the corners in the frame.
+    /// Own answers: the corners in the frame.
     pub corners: [[[f32; BATCH]; 3]; 3],
     /// Signs of x and y of each linear function, bit by triangle.
     pub negative: [[u32; 2]; 4],
@@ -212,23 +212,13 @@ impl Batch {
             let near = (eps[k] * high).cmp_le(seen * most) | eps[k].cmp_lt(groups.smallest(&edges[k]));
             steady = steady & near & (eps[k] * high * V::splat(LEAST_SUM)).cmp_le(size);
         }
-        // Edges that are nearly parallel, moved by their errors, meet far from the corner between them: what lies there is
-        // beyond all corners.
-        let (in_view, most) = (zero.cmp_lt(low), most / low);
-        for axis in 0..2 {
-            let [a, b, c] = each(|i| p[i][axis] / p[i][2]);
-            let (least, greatest) = (a.fast_min(b).fast_min(c) - most, a.fast_max(b).fast_max(c) + most);
-            select(in_view, least, V::splat(-f32::MAX)).store(&mut planes.rect[axis][0]);
-            select(in_view, greatest, V::splat(f32::MAX)).store(&mut planes.rect[axis][1]);
-        }
-        let doubt = eps[0].fast_max(eps[1]).fast_max(eps[2]);
-        (doubt + doubt).store(&mut planes.doubt);
+        // What was added to the edge functions is in them twice where they are surely positive.
+        let sure = eps[0].fast_max(eps[1]).fast_max(eps[2]);
+        (sure + sure).store(&mut planes.sure);
+        planes.corners = map3(*p, |q| map3(q, V::to_array));
         let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
         planes.wild = in_front & !V::splat(LEAST_VOLUME).cmp_le(size).bits();
         planes.unsteady = in_front & !steady.bits();
-        if planes.unsteady != 0 {
-            planes.corners = p.map(|q| q.map(V::to_array));
-        }
         // With its rounding error added, an edge function is positive wherever the exact one is.
         let [e0, e1, e2] = each(|k| [edges[k][0], edges[k][1], edges[k][2] + eps[k]]);
         planes.eps.iter_mut().zip(eps).for_each(|(to, x)| x.store(to));

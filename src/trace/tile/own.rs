@@ -18,43 +18,53 @@ pub fn own_depth(planes: &Planes, i: usize, inverse: V) -> V {
     V::splat(planes.nearest[i]).fast_min(V::splat(planes.farthest[i]).fast_max(inverse))
 }
 
-/// One triangle against the rays of one group that share their origin. Whether it was hit.
+/// What a pair of triangle and group came to.
+#[derive(Clone, Copy, Debug)]
+pub struct Verdict {
+    /// Some ray hit the triangle.
+    pub hit: bool,
+    /// Some ray passes an edge within its rounding: for [`pair_doubtful`].
+    pub doubt: bool,
+}
+
+/// One triangle against the rays of one group that share their origin.
 #[inline(always)]
-pub fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usize, prim: u32) -> bool {
-    let (inside, [e0, e1, e2]) = inside(groups, planes, g, i);
+pub fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usize, prim: u32) -> Verdict {
+    let (inside, maybe, [e0, e1, e2]) = inside(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
     let best = groups.of[g].inv_lo;
-    let inside = inside & inverse.cmp_le(groups.of[g].inv_hi);
+    let reached = inverse.cmp_le(groups.of[g].inv_hi) & best.cmp_le(inverse);
+    let doubt = (maybe & reached).any();
     if ANY {
-        return occlude(groups, g, inside & best.cmp_le(inverse));
+        return Verdict { hit: occlude(groups, g, inside & reached), doubt };
     }
-    let tie = best.cmp_eq(inverse) & Mask::from_bits(below(prim, &groups.of[g].slot));
-    let hit = inside & (best.cmp_lt(inverse) | tie);
+    let nearer = best.cmp_lt(inverse) | Mask::from_bits(below(prim, &groups.of[g].slot));
+    let hit = inside & reached & nearer;
     groups.of[g].inv_lo = select(hit, inverse, best);
     groups.of[g].slot = merge(hit, prim, groups.of[g].slot);
-    // A hit just outside of an edge is reported on it.
-    let inner = |e: V, k: usize| (e - V::splat(planes.eps[k][i])).fast_max(V::constant(0.0));
-    let (e0, e1, e2) = (inner(e0, 0), inner(e1, 1), inner(e2, 2));
+    let own = |e: V, k: usize| e - V::splat(planes.eps[k][i]);
+    let (e0, e1, e2) = (own(e0, 0), own(e1, 1), own(e2, 2));
     let weights = &mut groups.of[g].weights;
     weights[0] = select(hit, e1, weights[0]);
     weights[1] = select(hit, e2, weights[1]);
     weights[2] = select(hit, e0 + e1 + e2, weights[2]);
-    hit.any()
+    Verdict { hit: hit.any(), doubt }
 }
 
-/// One triangle against the rays of one group that share their end (any-hit). Whether it was hit.
+/// One triangle against the rays of one group that share their end (any-hit).
 ///
 /// Such rays start on surfaces, a few roundings in front of them. Depths from the far end cannot tell which side of
 /// its own surface a ray starts on; where the start lies with respect to the triangle's plane can.
 #[inline(always)]
-pub fn pair_to_end(groups: &mut Groups, planes: &Planes, g: usize, i: usize) -> bool {
-    let (inside, _) = inside(groups, planes, g, i);
+pub fn pair_to_end(groups: &mut Groups, planes: &Planes, g: usize, i: usize) -> Verdict {
+    let (inside, maybe, _) = inside(groups, planes, g, i);
     let behind = behind(groups, planes, g, i);
-    let mut hit = inside & V::constant(0.0).cmp_le(behind) & groups.of[g].inv_lo.cmp_lt(V::splat(f32::INFINITY));
+    let mut reached = V::constant(0.0).cmp_le(behind) & groups.of[g].inv_lo.cmp_lt(V::splat(f32::INFINITY));
     if groups.ends_early {
-        hit = hit & own_depth(planes, i, linear(groups, planes, g, i, 3)).cmp_le(groups.of[g].inv_hi);
+        reached = reached & own_depth(planes, i, linear(groups, planes, g, i, 3)).cmp_le(groups.of[g].inv_hi);
     }
-    occlude(groups, g, hit)
+    let doubt = (maybe & reached).any();
+    Verdict { hit: occlude(groups, g, inside & reached), doubt }
 }
 
 /// How far the segments of a group start behind a triangle's plane as seen from their common end; in some unit.
@@ -65,11 +75,12 @@ fn behind(groups: &Groups, planes: &Planes, g: usize, i: usize) -> V {
     nz.mul_add(z, ny.mul_add(y, nx * x))
 }
 
-/// [`pair`] for a triangle whose edges need more digits than f32 has: a sliver, or one much smaller than a pixel. What is
-/// not certainly outside is looked at again in f64, for the same corners and rays.
+/// [`pair`] where edges need more digits than f32 has: for a sliver, a triangle much smaller than a pixel, or rays that
+/// pass an edge within its rounding. What is not certainly outside is looked at again in f64, for the same corners and
+/// rays.
 #[cold]
 #[inline(never)]
-pub fn pair_unsteady<const ANY: bool>(
+pub fn pair_doubtful<const ANY: bool>(
     groups: &mut Groups,
     planes: &Planes,
     g: usize,
@@ -77,10 +88,10 @@ pub fn pair_unsteady<const ANY: bool>(
     prim: u32,
     to_end: bool,
 ) -> bool {
-    let (inside, _) = inside(groups, planes, g, i);
+    let (inside, doubtful, _) = inside(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
     let best = groups.of[g].inv_lo;
-    let mut maybe = inside & inverse.cmp_le(groups.of[g].inv_hi);
+    let mut maybe = (inside | doubtful) & inverse.cmp_le(groups.of[g].inv_hi);
     if ANY && to_end {
         maybe = maybe & V::constant(0.0).cmp_le(behind(groups, planes, g, i)) & best.cmp_lt(V::splat(f32::INFINITY));
     } else {
@@ -134,29 +145,14 @@ fn linear(groups: &Groups, planes: &Planes, g: usize, i: usize, k: usize) -> V {
     x.mul_add(groups.of[g].s, y.mul_add(groups.of[g].t, z))
 }
 
-/// Lanes inside the triangle, and the edge functions.
+/// Lanes surely inside the triangle, lanes that rounding may have put on the wrong side of an edge, and the edge
+/// functions.
 #[inline(always)]
-fn inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> (Mask, [V; 3]) {
+fn inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> (Mask, Mask, [V; 3]) {
     let edges = each(|k| linear(groups, planes, g, i, k));
     let least = edges[0].fast_min(edges[1]).fast_min(edges[2]);
-    let inside = V::constant(0.0).cmp_le(least);
-    let doubtful = inside & least.cmp_lt(V::splat(planes.doubt[i]));
-    if doubtful.any() {
-        return (between_corners(groups, planes, g, i, inside, doubtful), edges);
-    }
-    (inside, edges)
-}
-
-/// Of the lanes `inside`, those that are surely so, and those of the `doubtful` that are not beyond all corners.
-#[cold]
-#[inline(never)]
-fn between_corners(groups: &Groups, planes: &Planes, g: usize, i: usize, inside: Mask, doubtful: Mask) -> Mask {
-    let between = |axis: usize, x: V| {
-        let [low, high] = &planes.rect[axis];
-        (V::splat(low[i]).cmp_le(x) & x.cmp_le(V::splat(high[i]))).bits()
-    };
-    let beyond = !(between(0, groups.of[g].s) & between(1, groups.of[g].t));
-    Mask::from_bits(inside.bits() & !(doubtful.bits() & beyond))
+    let sure = V::splat(planes.sure[i]);
+    (sure.cmp_le(least), V::constant(0.0).cmp_le(least) & least.cmp_lt(sure), edges)
 }
 
 /// Lanes that found something want nothing any more.

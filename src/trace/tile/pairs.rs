@@ -4,7 +4,7 @@ use super::batch::{BATCH, Planes};
 use super::bundle::Shared;
 use super::exact::{self, Exact, certain_pair};
 use super::groups::Groups;
-use super::own::{self, own_depth, pair, pair_to_end, pair_unsteady};
+use super::own::{self, Verdict, own_depth, pair, pair_doubtful, pair_to_end};
 use super::{GROUPS, Memory, SET, V};
 use crate::lanes::words::list_bits;
 use crate::lanes::{LaneMask, Lanes, each};
@@ -18,11 +18,13 @@ const MOST: usize = BATCH * GROUPS;
 pub struct Pairs {
     group: [u8; MOST + SET],
     triangle: [u8; MOST + SET],
+    /// Numbers of the pairs to look at again.
+    again: [u16; MOST],
 }
 
 impl Default for Pairs {
     fn default() -> Self {
-        Self { group: [0; MOST + SET], triangle: [0; MOST + SET] }
+        Self { group: [0; MOST + SET], triangle: [0; MOST + SET], again: [0; MOST] }
     }
 }
 
@@ -36,7 +38,7 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     let Memory { groups, batch, planes, pairs, slabs, .. } = memory;
     let seen = batch.set_up::<ANY, EXACT>(groups, planes);
     let (count, touched) = list::<N, EXACT>(seen, &batch.groups, groups, planes, pairs);
-    let mut found = 0;
+    let (mut found, mut again) = (0, 0);
     let to_end = matches!(exact.bundle.shared, Shared::End(_));
     for k in 0..count {
         let (g, i) = (usize::from(pairs.group[k]) & (GROUPS - 1), usize::from(pairs.triangle[k]) & 15);
@@ -46,14 +48,22 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
             if doubtful != 0 {
                 exact::decide::<ANY>(groups, exact, g, batch.id[i], doubtful);
             }
-        } else if planes.wild >> i & 1 != 0 {
-            found += usize::from(own::decide::<ANY>(groups, exact, g, batch.corners(i), batch.id[i]));
-        } else if planes.unsteady >> i & 1 != 0 {
-            found += usize::from(pair_unsteady::<ANY>(groups, planes, g, i, batch.id[i], to_end));
-        } else if ANY && to_end {
-            found += usize::from(pair_to_end(groups, planes, g, i));
+        } else if (planes.wild | planes.unsteady) >> i & 1 != 0 {
+            found += usize::from(if planes.wild >> i & 1 != 0 {
+                own::decide::<ANY>(groups, exact, g, batch.corners(i), batch.id[i])
+            } else {
+                pair_doubtful::<ANY>(groups, planes, g, i, batch.id[i], to_end)
+            });
         } else {
-            found += usize::from(pair::<ANY>(groups, planes, g, i, batch.id[i]));
+            let Verdict { hit, doubt } = if ANY && to_end {
+                pair_to_end(groups, planes, g, i)
+            } else {
+                pair::<ANY>(groups, planes, g, i, batch.id[i])
+            };
+            found += usize::from(hit);
+            // Always written, counted where it is wanted: a call in this loop would take the registers of all of it.
+            pairs.again[again.min(MOST - 1)] = k as u16;
+            again += usize::from(doubt);
         }
         if COUNT {
             counters.prims += 1;
@@ -62,6 +72,10 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
             let waiting = groups.of[g].inv_lo.cmp_lt(V::splat(f32::INFINITY));
             counters.prim_lanes_active += u64::from(waiting.bits().count_ones());
         }
+    }
+    for &k in pairs.again.iter().take(again) {
+        let (g, i) = (usize::from(pairs.group[usize::from(k)]), usize::from(pairs.triangle[usize::from(k)]) & 15);
+        pair_doubtful::<ANY>(groups, planes, g & (GROUPS - 1), i, batch.id[i], to_end);
     }
     batch.clear();
     slabs.learn(count, found);
