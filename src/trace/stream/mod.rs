@@ -163,7 +163,7 @@ impl<S: Real> Job<'_, S> {
             high - low
         };
         let most = V::Scalar::from_f64(SPREAD);
-        if !packets && !(spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most) {
+        if !(packets || spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most) {
             return false;
         }
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
