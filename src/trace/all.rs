@@ -56,7 +56,7 @@ struct Job<'a, V: Lanes> {
     live: u32,
     first: u32,
     list: &'a mut Vec<Stretch>,
-    solids: &'a mut csg::Scratch<V::Scalar>,
+    solids: &'a mut Option<Box<csg::Scratch<V::Scalar>>>,
 }
 
 /// What a lane is in the middle of.
@@ -135,7 +135,7 @@ impl<V: Lanes> Job<'_, V> {
     ) {
         let endless = Open { t_in: f64::NEG_INFINITY, prim_in: INVALID_ID };
         let mut open = [placed.solid.reaches_everywhere().then_some(endless); MAX_LANES];
-        let mut scratch = std::mem::take(self.solids);
+        let mut scratch = self.solids.take().unwrap_or_default();
         csg::sweep(&placed.solid, packet, (lanes, interval), self.t_max, Depth::Whole, &mut scratch, |boundary| {
             let t = packet.t_floor.fast_max(interval.clamp(boundary.t));
             let prim = placed.first_prim + placed.solid.number(boundary.leaf);
@@ -151,7 +151,7 @@ impl<V: Lanes> Job<'_, V> {
             }
             0
         });
-        *self.solids = scratch;
+        *self.solids = Some(scratch);
         for lane in (0..V::N).filter(|lane| lanes >> lane & 1 != 0) {
             if let Some(entered) = open[lane] {
                 self.close(packet, lane, entered, f64::INFINITY, INVALID_ID, inst);

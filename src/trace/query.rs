@@ -20,8 +20,8 @@ pub struct Stack<S> {
     near: Vec<S>,
     /// What waits for a single ray.
     pub waiting: Vec<Waiting<S>>,
-    /// What trees of solids need.
-    pub solids: csg::Scratch<S>,
+    /// What trees of solids need: large, and lent to every sweep.
+    pub solids: Option<Box<csg::Scratch<S>>>,
 }
 
 impl<S: Real> Stack<S> {

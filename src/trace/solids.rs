@@ -25,7 +25,8 @@ pub fn trace<V: Lanes, const ANY: bool, const COUNT: bool>(
     if wanted == 0 {
         return;
     }
-    let mut scratch = std::mem::take(&mut query.stack.solids);
+    // Lent to the sweep, which calls back with the query.
+    let mut scratch = query.stack.solids.take().unwrap_or_default();
     let limit = query.hit.t;
     let effort =
         csg::sweep(&placed.solid, packet, (wanted, &interval), limit, Depth::FrontFirst, &mut scratch, |boundary| {
@@ -35,7 +36,7 @@ pub fn trace<V: Lanes, const ANY: bool, const COUNT: bool>(
             // What lies beyond the end of a segment ends the lane too.
             found.hit.bits() & boundary.lanes
         });
-    query.stack.solids = scratch;
+    query.stack.solids = Some(scratch);
     if COUNT {
         count(query, wanted, &effort);
     }

@@ -12,6 +12,7 @@
 //! picture does not depend on what else is in a wave.
 
 mod alias;
+mod bare;
 mod bsdf;
 mod emitter;
 mod lights;
@@ -28,6 +29,7 @@ use glam::DVec3;
 
 pub(super) use self::bsdf::fresnel;
 
+use self::bare::BareTriangles;
 use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
 };
@@ -66,6 +68,7 @@ pub(super) struct Paths<'a, S: Real> {
     shadow_end: S,
     /// Whether some hits come out of the world in lanes.
     has_facets: bool,
+    bare: BareTriangles<S>,
 }
 
 /// One thread's arrays, reused from wave to wave.
@@ -107,8 +110,8 @@ impl<'a, S: Real> Paths<'a, S> {
         let lights = Lights::new(world, description, &looks);
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
         let Settings { depth, seed, first_hits, .. } = *settings;
-        let has_facets = world.has_facets();
-        Self { world, engine, looks, lights, depth, seed, first_hits, shadow_end, has_facets }
+        let (has_facets, bare) = (world.has_facets(), BareTriangles::new(world, &looks));
+        Self { world, engine, looks, lights, depth, seed, first_hits, shadow_end, has_facets, bare }
     }
 
     /// The radiance along each ray of the primary batch `rays` into `out`, which holds misses; see
@@ -266,10 +269,11 @@ impl<'a, S: Real> Paths<'a, S> {
                 memory.points[look.model as usize].push(path, &fields, false);
                 return;
             }
-            let bare = self.world.bare_triangle(prim, inst);
-            if let (Some(triangle), Some(look)) = (bare.triangle, self.looks.uniform(bare.material)) {
+            if let Some(bare) = self.bare.get(self.world, &self.looks, prim, inst)
+                && let Some(look) = self.looks.uniform(bare.material)
+            {
                 first_seen(bare.material, seen);
-                let fields = wave.raw_fields(i, hits, &triangle, look);
+                let fields = wave.raw_fields(i, hits, &bare.numbers, look);
                 memory.points[look.model as usize].push(path, &fields, true);
                 return;
             }

@@ -26,13 +26,11 @@ pub const FIELDS: usize = 27;
 
 // What a raw point has instead, until it is settled.
 
-/// First corner of the triangle, world space.
-pub const RAW_CORNER: usize = POSITION;
-/// To the second corner.
-pub const RAW_EDGE1: usize = SHADING;
-/// To the third corner.
-pub const RAW_EDGE2: usize = NORMAL;
-/// Weights of the second and third corner, distance from the ray's origin.
+/// First corner of the triangle, world space, and the edges from it to the second and the third.
+pub const RAW_TRIANGLE: usize = POSITION;
+/// Direction of the ray.
+pub const RAW_DIR: usize = OUT;
+/// Weights of the second and third corner, parameter of the hit.
 pub const RAW_PLACE: usize = PARAM + 4;
 
 /// Roundings of a raw point's triangle (see [`super::super::offset`]), with those of its weights.
@@ -71,8 +69,8 @@ impl<S: Real> Points<S> {
         self.path.len()
     }
 
-    /// Adds a point of path `path`. A raw one, on a triangle without shading normals, has [`RAW_CORNER`] and so on
-    /// instead of position, normals and offset; its model has at most four parameters.
+    /// Adds a point of path `path`. A raw one, on a triangle without shading normals, has [`RAW_TRIANGLE`] and so on
+    /// instead of position, normals, direction and offset; its model has at most four parameters.
     #[inline]
     pub fn push(&mut self, path: u32, fields: &Fields<S>, is_raw: bool) {
         let lane = self.path.len() % MAX_LANES;
@@ -88,7 +86,7 @@ impl<S: Real> Points<S> {
         }
     }
 
-    /// Computes position, normals and offset of the raw points.
+    /// Computes position, normals, direction and offset of the raw points.
     pub fn settle(&mut self) {
         for block in self.blocks.iter_mut().filter(|block| block.raw != 0) {
             for first in (0..MAX_LANES).step_by(S::Wide::N) {
@@ -115,14 +113,16 @@ fn settle<S: Real>(block: &mut Block<S>, first: usize) {
     let scalar = |field: usize| S::Wide::load(&block.fields[field][first..]);
     let vector = |field: usize| [0, 1, 2].map(|i| scalar(field + i));
     let raw = <S::Wide as Lanes>::Mask::from_bits(block.raw >> first);
-    let (corner, e1, e2) = (vector(RAW_CORNER), vector(RAW_EDGE1), vector(RAW_EDGE2));
-    let [u, v, distance] = vector(RAW_PLACE);
-    let out = vector(OUT);
+    let (corner, e1, e2) = (vector(RAW_TRIANGLE), vector(RAW_TRIANGLE + 3), vector(RAW_TRIANGLE + 6));
+    let ([u, v, t], dir) = (vector(RAW_PLACE), vector(RAW_DIR));
+    let length = dot(dir, dir).sqrt();
+    let back = S::Wide::constant(-1.0) / length;
+    let (out, distance) = (dir.map(|x| x * back), t * length);
     let position: Lanes3<S::Wide> = [0, 1, 2].map(|i| v.mul_add(e2[i], u.mul_add(e1[i], corner[i])));
     // Edges of length about one: products of very small or large ones would leave the range of numbers.
-    let length = |e: Lanes3<S::Wide>| e[0].abs() + e[1].abs() + e[2].abs();
+    let size = |e: Lanes3<S::Wide>| e[0].abs() + e[1].abs() + e[2].abs();
     let unit = |e: Lanes3<S::Wide>| {
-        let rcp = S::Wide::constant(1.0) / length(e);
+        let rcp = S::Wide::constant(1.0) / size(e);
         e.map(|x| x * rcp)
     };
     let normal = normalize(cross(unit(e1), unit(e2)));
@@ -149,6 +149,7 @@ fn settle<S: Real>(block: &mut Block<S>, first: usize) {
         put(POSITION + axis, position[axis]);
         put(SHADING + axis, normal[axis]);
         put(NORMAL + axis, normal[axis]);
+        put(OUT + axis, out[axis]);
     }
     put(OFFSET, offset);
 }
