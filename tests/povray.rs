@@ -20,7 +20,7 @@ const HEIGHT: usize = 180;
 /// 1/65535, and its lights fall off by 1 / d^2 up to 10^-5 of their light.
 const TOLERANCE: f64 = 5e-5;
 /// The share of pixels that may differ by more: edges, and edges of shadows, that pass between two roundings.
-const EDGES: f64 = 0.003;
+const EDGES: f64 = 0.001;
 
 /// Red, green, blue of each pixel, rows from the top.
 type Picture = Vec<[f64; 3]>;

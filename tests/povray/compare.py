@@ -27,7 +27,7 @@ sys.path.insert(0, str(HERE.parent / "python"))
 import machine  # noqa: E402
 
 # As in tests/povray.rs, which says why.
-TOLERANCE, EDGES = 5e-5, 0.003
+TOLERANCE, EDGES = 5e-5, 0.001
 CHECK_SIZE = (160, 120)
 # Name: scene, size, what changes a parameter in either language. The size of the last one lets a run end in a minute.
 CASES = {
