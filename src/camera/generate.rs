@@ -68,13 +68,31 @@ pub fn fill_tile<S: Real>(
     let mut a = [0.0; LARGEST_BATCH];
     let mut b = [0.0; LARGEST_BATCH];
     let (columns, rows) = (f64::from(tiling.width()), f64::from(tiling.height()));
-    for i in 0..count {
-        let (dx, dy) = morton_decode(i as u32);
-        let [sx, sy] = sub_pixel.offset(camera.anchor, x0 + dx, y0 + dy);
-        let c = f64::from(x0 + dx) + sx;
-        let r = rows - (f64::from(y0 + dy) + sy);
-        a[i] = camera.half_width * (2.0 * c / columns - 1.0);
-        b[i] = camera.half_height * (2.0 * r / rows - 1.0);
+    let across = |x: u32, sx: f64| {
+        let c = f64::from(x) + sx;
+        camera.half_width * (2.0 * c / columns - 1.0)
+    };
+    let up = |y: u32, sy: f64| {
+        let r = rows - (f64::from(y) + sy);
+        camera.half_height * (2.0 * r / rows - 1.0)
+    };
+    if sub_pixel == SubPixel::Anchor {
+        // One place in all pixels: a column's pixels have one a, a row's one b.
+        let (mut of_column, mut of_row) = ([0.0; FILE_TILE as usize], [0.0; FILE_TILE as usize]);
+        for k in 0..tiling.edge() {
+            of_column[k as usize] = across(x0 + k, camera.anchor[0]);
+            of_row[k as usize] = up(y0 + k, camera.anchor[1]);
+        }
+        for i in 0..count {
+            let (dx, dy) = morton_decode(i as u32);
+            (a[i], b[i]) = (of_column[dx as usize], of_row[dy as usize]);
+        }
+    } else {
+        for i in 0..count {
+            let (dx, dy) = morton_decode(i as u32);
+            let [sx, sy] = sub_pixel.offset(camera.anchor, x0 + dx, y0 + dy);
+            (a[i], b[i]) = (across(x0 + dx, sx), up(y0 + dy, sy));
+        }
     }
     rays.reset(count);
     for axis in 0..3 {

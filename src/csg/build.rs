@@ -232,6 +232,7 @@ impl<S: Real> Solid<S> {
             least: S::ZERO,
             search: None,
             always: Vec::new(),
+            is_sole: false,
         }
     }
 
@@ -244,6 +245,8 @@ impl<S: Real> Solid<S> {
             }
         }
         self.index(preset);
+        let leaf_is_all = self.tree.nodes.len() == 1 && self.leaves.len() == 1 && !self.tree.leaves[0].negated;
+        self.is_sole = leaf_is_all && self.leaves[0].clip == self.bounds;
         self
     }
 

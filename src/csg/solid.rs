@@ -13,8 +13,8 @@ use crate::ray::slab::Interval;
 
 /// Boundaries closer than this many roundings of the coordinates are one: 16 half ulps.
 const ROUNDINGS: f64 = 16.0;
-/// Layers of leaves in the first part of a line.
-const LAYERS: f64 = 4.0;
+/// Layers of leaves, were they spread evenly, in the first part of a line (tried: 0.5, 1, 2, 4).
+const LAYERS: f64 = 1.0;
 /// More bounded leaves than this are searched by a tree.
 pub(super) const LINEAR: usize = 24;
 
@@ -36,6 +36,8 @@ pub struct Solid<S> {
     pub(super) search: Option<(bvh::Tree<S>, Vec<Vec<u32>>)>,
     /// Leaves that the tree does not hold.
     pub(super) always: Vec<u32>,
+    /// Whether it is its only leaf, box and all.
+    pub(super) is_sole: bool,
 }
 
 impl<S: Real> Solid<S> {
@@ -145,12 +147,28 @@ impl<S: Real> Solid<S> {
         crossings: &mut Crossings,
     ) {
         let slack = eps + eps;
-        let leaf = &self.leaves[met.leaf as usize];
-        let within = Interval::of(packet, leaf.clip.lo, leaf.clip.hi);
-        let within = Interval { near: within.near - slack, far: within.far + slack };
+        let clip = &self.leaves[met.leaf as usize].clip;
+        let within = Interval::of(packet, clip.lo, clip.hi);
         // Groups of boundaries that begin before the limit end less than `slack` after it.
-        if within.near.cmp_le(limit + slack).bits() & met.lanes != 0 {
-            leaf.boundaries(packet, &within, (&self.stores, eps), (slot, met.lanes), (events, crossings));
+        if (within.near - slack).cmp_le(limit + slack).bits() & met.lanes != 0 {
+            self.boundaries_within(packet, met, slot, (&within, eps), events, crossings);
         }
+    }
+
+    /// Adds the boundaries of a leaf whose box the lines meet in `interval`. `eps`: the tolerance.
+    #[inline(never)]
+    pub(super) fn boundaries_within<V: Lanes<Scalar = S>>(
+        &self,
+        packet: &Packet<V>,
+        met: &Met,
+        slot: u32,
+        (interval, eps): (&Interval<V>, V),
+        events: &mut Events<S>,
+        crossings: &mut Crossings,
+    ) {
+        let slack = eps + eps;
+        let within = Interval { near: interval.near - slack, far: interval.far + slack };
+        let leaf = &self.leaves[met.leaf as usize];
+        leaf.boundaries(packet, &within, (&self.stores, eps), (slot, met.lanes), (events, crossings));
     }
 }

@@ -140,6 +140,9 @@ pub fn sweep<V: Lanes>(
     scratch: &mut Scratch<V::Scalar>,
     mut found: impl FnMut(&Boundary<V>) -> u32,
 ) -> Effort {
+    if solid.is_sole {
+        return sole(solid, packet, (lanes, interval), limit, scratch, found);
+    }
     let mut effort = Effort::default();
     let mut share = if depth == Depth::Whole { 1.0 } else { solid.front() };
     let start = interval.near.fast_max(packet.t_min);
@@ -163,6 +166,44 @@ pub fn sweep<V: Lanes>(
     }
 }
 
+/// The same where the solid is its only leaf.
+#[inline(always)]
+fn sole<V: Lanes>(
+    solid: &Solid<V::Scalar>,
+    packet: &Packet<V>,
+    (lanes, interval): (u32, &Interval<V>),
+    limit: V,
+    scratch: &mut Scratch<V::Scalar>,
+    mut found: impl FnMut(&Boundary<V>) -> u32,
+) -> Effort {
+    let eps = solid.tolerance(packet);
+    let limit = limit.fast_min(V::splat(V::Scalar::MAX));
+    let Scratch { met, events, crossings, pruner, program, .. } = scratch;
+    met.clear();
+    met.push(Met { leaf: 0, lanes });
+    events.clear();
+    solid.boundaries_within(packet, &met[0], 0, (interval, eps), events, crossings);
+    let count = events.count;
+    if count != 2 {
+        pruner.prune(&solid.tree, met, program);
+        let steps = if count == 0 { 0 } else { walk(scratch, lanes, limit, eps, found) };
+        return Effort { met: 1, kept: 1, events: count, steps };
+    }
+    let (t_in, t_out) = (events.time::<V>(0), events.time::<V>(1));
+    // As in the sweep, boundaries within the tolerance are taken together: the line only touches.
+    let apart = (t_in + eps).cmp_lt(t_out).bits() & lanes;
+    let enters = t_in.cmp_le(limit).bits() & apart;
+    let mut done = 0;
+    if enters != 0 {
+        done = found(&boundary(met, &[enters], events, 0, enters, enters));
+    }
+    let leaves = t_out.cmp_le(limit).bits() & apart & !done;
+    if leaves != 0 {
+        found(&boundary(met, &[0], events, 1, leaves, 0));
+    }
+    Effort { met: 1, kept: 1, events: 2, steps: 1 + usize::from(leaves != 0) }
+}
+
 impl std::ops::AddAssign for Effort {
     fn add_assign(&mut self, o: Self) {
         self.met += o.met;
@@ -181,30 +222,43 @@ fn pass<V: Lanes>(
     limit: V,
     reach: V,
     scratch: &mut Scratch<V::Scalar>,
-    mut found: impl FnMut(&Boundary<V>) -> u32,
+    found: impl FnMut(&Boundary<V>) -> u32,
 ) -> Effort {
     let mut effort = Effort::default();
     let eps = solid.tolerance(packet);
     let limit = limit.fast_min(V::splat(V::Scalar::MAX));
-    let Scratch { met, pruner, program, events, inside, toggled, stack, crossings } = scratch;
+    let Scratch { met, pruner, program, events, stack, crossings, .. } = scratch;
     solid.meet(packet, lanes, eps, reach, met, stack);
     effort.met = met.len();
     pruner.prune(&solid.tree, met, program);
     effort.kept = met.len();
     events.clear();
-    inside.clear();
-    inside.resize(met.len(), 0);
-    let mut state = program.run(inside);
-    if met.is_empty() {
-        return effort;
-    }
     let mut pending = 0;
     for (slot, m) in met.iter().enumerate() {
         pending |= m.lanes;
         solid.boundaries(packet, m, slot as u32, limit, eps, events, crossings);
     }
     effort.events = events.count;
-    pending &= lanes;
+    if !met.is_empty() {
+        effort.steps = walk(scratch, pending & lanes, limit, eps, found);
+    }
+    effort
+}
+
+/// Takes the events in their order, up to `limit`; how many steps that took.
+#[inline(always)]
+fn walk<V: Lanes>(
+    scratch: &mut Scratch<V::Scalar>,
+    mut pending: u32,
+    limit: V,
+    eps: V,
+    mut found: impl FnMut(&Boundary<V>) -> u32,
+) -> usize {
+    let Scratch { met, program, events, inside, toggled, .. } = scratch;
+    let mut steps = 0;
+    inside.clear();
+    inside.resize(met.len(), 0);
+    let mut state = program.run(inside);
     loop {
         let mut next = V::splat(V::Scalar::INFINITY);
         for event in 0..events.count {
@@ -212,9 +266,9 @@ fn pass<V: Lanes>(
         }
         pending &= next.cmp_le(limit).bits();
         if pending == 0 {
-            return effort;
+            return steps;
         }
-        effort.steps += 1;
+        steps += 1;
         let until = next + eps;
         let (mut once, mut twice) = (0, 0);
         toggled.clear();

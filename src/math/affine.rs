@@ -2,7 +2,7 @@
 //! number on both sides; normals map by the inverse transpose (Turkowski, "Properties of surface-normal
 //! transformations", Graphics Gems, 1990).
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 use crate::lanes::{Lanes, Lanes3, Real};
 
@@ -54,6 +54,12 @@ impl NormalMap {
         let m = to_world.matrix3;
         let cofactor = [m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis)];
         Self { cofactor, sign: m.determinant().signum() }
+    }
+
+    /// The inverse transpose, times the determinant's size.
+    pub fn matrix(&self) -> DMat3 {
+        let [x, y, z] = self.cofactor;
+        DMat3::from_cols(x, y, z) * self.sign
     }
 
     /// A normal of the local space in the world, made unit. A zero or non-finite result (degenerate input) comes back as

@@ -3,7 +3,7 @@
 //! A batch is what an engine gets in one call: usually the rays of one 32x32 or 16x16 pixel tile in Morton order.
 //! The arrays are padded with dead rays to a multiple of [`PAD`], so every packet width loads whole vectors.
 
-use crate::lanes::Real;
+use crate::lanes::{LaneMask, Lanes, Real};
 
 /// "No primitive", "no instance".
 pub const INVALID_ID: u32 = u32::MAX;
@@ -109,7 +109,18 @@ impl<S: Real> Rays<S> {
 
     /// Number of live rays.
     pub fn live_count(&self) -> usize {
-        (0..self.len).filter(|&i| self.is_live(i)).count()
+        let mut count = 0;
+        // The padding is dead.
+        for first in (0..self.padded_len()).step_by(S::Wide::N) {
+            let load = |from: &[S]| S::Wide::load(&from[first..]);
+            let zero = S::Wide::constant(0.0);
+            let nothing = |v: &[Vec<S>; 3]| load(&v[0]) * zero + load(&v[1]) * zero + load(&v[2]) * zero;
+            let finite = (nothing(&self.org) + nothing(&self.dir)).cmp_eq(zero);
+            let [x, y, z] = [0, 1, 2].map(|axis| load(&self.dir[axis]).cmp_eq(zero));
+            let live = finite & !(x & y & z) & load(&self.t_min).cmp_le(load(&self.t_max));
+            count += (live.bits() & S::Wide::ALL).count_ones();
+        }
+        count as usize
     }
 }
 

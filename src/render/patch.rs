@@ -26,23 +26,22 @@ pub(super) fn empty_film(size: (u32, u32), window: Window, channels: &[Channel])
 pub(super) struct Patch {
     /// Places in the planes.
     places: Vec<usize>,
+    /// Numbers of the pixels that have one.
+    kept: Vec<u32>,
     /// By channel: the value of each place.
     values: Vec<PlaneData>,
 }
 
 impl Patch {
-    /// Takes the values of `pixels` that lie in `window`, and forgets earlier ones; `channels` are the same each time.
-    pub fn fill(
-        &mut self,
-        channels: &[Channel],
-        window: Window,
-        pixels: impl IntoIterator<Item = ((u32, u32), Sample)>,
-    ) {
+    /// Takes the values of those of `pixels` that lie in `window` from `samples`, parallel to them, and forgets earlier
+    /// ones; `channels` are the same each time.
+    pub fn fill(&mut self, channels: &[Channel], window: Window, pixels: &[(u32, u32)], samples: &[Sample]) {
         self.places.clear();
-        for values in &mut self.values {
-            match values {
-                PlaneData::F32(values) => values.clear(),
-                PlaneData::U32(values) => values.clear(),
+        self.kept.clear();
+        for (number, &(x, y)) in pixels.iter().enumerate() {
+            if let Some(place) = window.index(x, y) {
+                self.places.push(place);
+                self.kept.push(number as u32);
             }
         }
         if self.values.is_empty() {
@@ -51,15 +50,18 @@ impl Patch {
                 Get::U32(_) => PlaneData::U32(Vec::new()),
             }));
         }
-        for ((x, y), pixel) in pixels {
-            let Some(place) = window.index(x, y) else { continue };
-            self.places.push(place);
-            for (channel, values) in channels.iter().zip(&mut self.values) {
-                match (channel.get, values) {
-                    (Get::F32(get), PlaneData::F32(values)) => values.push(get(&pixel) as f32),
-                    (Get::U32(get), PlaneData::U32(values)) => values.push(get(&pixel)),
-                    _ => unreachable!("values are made from the channels"),
+        let kept = self.kept.iter().map(|&number| &samples[number as usize]);
+        for (channel, values) in channels.iter().zip(&mut self.values) {
+            match (channel.get, values) {
+                (Get::F32(get), PlaneData::F32(values)) => {
+                    values.clear();
+                    values.extend(kept.clone().map(|sample| get(sample) as f32));
                 }
+                (Get::U32(get), PlaneData::U32(values)) => {
+                    values.clear();
+                    values.extend(kept.clone().map(get));
+                }
+                _ => unreachable!("values are made from the channels"),
             }
         }
     }
@@ -100,8 +102,8 @@ mod tests {
         let mut film = empty_film((10, 10), window, &channels);
         let pixel = Sample { radiance: DVec3::new(1.0, 2.0, 3.0), alpha: 1.0, distance: 4.0, prim: 9, ..Sample::MISS };
         let mut patch = Patch::default();
-        patch.fill(&channels, window, [((4, 2), pixel)]);
-        patch.fill(&channels, window, [((5, 3), pixel), ((7, 3), pixel), ((5, 4), pixel)]);
+        patch.fill(&channels, window, &[(4, 2)], &[pixel]);
+        patch.fill(&channels, window, &[(5, 3), (7, 3), (5, 4)], &[pixel; 3]);
         patch.paint(&mut film);
         assert_eq!(patch.places(), [4]);
         let names: Vec<&str> = film.planes.iter().map(|p| p.name.as_str()).collect();

@@ -4,6 +4,11 @@ use glam::DVec3;
 
 use crate::shade::Sample;
 
+/// Makes a sample the sum of one: the same as adding it to [`Sample::MISS`].
+pub(super) fn begin(sample: &mut Sample) {
+    sample.square = brightness(sample.radiance).powi(2);
+}
+
 /// Adds `sample` to the sum of a pixel's samples. Colours, coverage, normals and costs add up (misses count as 0);
 /// distance, position and ids come together from the nearest sample, the first of equals.
 pub(super) fn add(sum: &mut Sample, sample: &Sample) {
@@ -40,6 +45,9 @@ pub(super) fn variance(sum: &Sample, count: u32) -> f64 {
 /// The pixel's value from the sum of its `spp` samples.
 pub(super) fn mean(sum: &Sample, spp: u32) -> Sample {
     let (variance, samples) = (variance(sum, spp), spp);
+    if spp == 1 {
+        return Sample { square: variance, samples, ..*sum };
+    }
     let spp = f64::from(spp);
     Sample {
         radiance: sum.radiance / spp,
@@ -69,5 +77,11 @@ mod tests {
         let pixel = mean(&sum, 4);
         assert_eq!((pixel.radiance, pixel.alpha, pixel.nodes), (DVec3::X * 0.75, 0.75, 4.0));
         assert_eq!((pixel.distance, pixel.inst, pixel.prim), (3.0, 1, 5));
+        for sample in [far, Sample::MISS] {
+            let (mut first, mut sum) = (sample, Sample::MISS);
+            begin(&mut first);
+            add(&mut sum, &sample);
+            assert_eq!(first, sum);
+        }
     }
 }

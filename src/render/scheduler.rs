@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::aov::Channel;
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{Patch, channels, empty_film};
-use super::pixels::{add, mean, variance};
+use super::pixels::{add, begin, mean, variance};
 use super::tally::Tally;
 use crate::camera::{Camera, PixelRect, Tiling, fill_tile, morton_decode};
 use crate::error::{Result, locked};
@@ -89,7 +89,7 @@ pub fn render_with<S: Real>(
     let film = Mutex::new(empty_film((options.width, options.height), window, &channels));
     let job = Job { shader, camera, tiling, rect: rect_of(window), window, channels, options, progress, start };
     let tiles = tiling.tiles_in(job.rect);
-    let paint = |sums: &Sums, pixels: &[(u32, u32)], patch: &mut Patch| {
+    let paint = |sums: &mut Sums, pixels: &[(u32, u32)], patch: &mut Patch| {
         job.fill(patch, sums, pixels);
         patch.paint(&mut locked(&film));
         progress.tile_done(tiles.len() as u64);
@@ -99,10 +99,10 @@ pub fn render_with<S: Real>(
     } else {
         let one_tile = |memory: &mut TileMemory<S>, &tile: &u32| {
             let mut sums = take(&mut memory.sums);
-            sums.start(job.tiling.rays_per_tile());
+            sums.start();
             let finished = job.samples(tile, options.spp, &mut sums, memory);
             if finished {
-                paint(&sums, &memory.pixels, &mut memory.patch);
+                paint(&mut sums, &memory.pixels, &mut memory.patch);
             }
             memory.sums = sums;
             Tally::take(&mut memory.work, u64::from(finished))
@@ -142,9 +142,8 @@ struct Sums {
 }
 
 impl Sums {
-    fn start(&mut self, rays: u32) {
+    fn start(&mut self) {
         self.pixels.clear();
-        self.pixels.resize(rays as usize, Sample::MISS);
         self.count = 0;
     }
 
@@ -204,8 +203,11 @@ impl<S: Real> Job<'_, S> {
             let sub_pixel = self.options.sub_pixel(sample);
             fill_tile(self.camera, &self.tiling, tile, self.rect, sub_pixel, &mut memory.rays);
             self.shader.shade(&memory.rays, &memory.pixels, sample, &mut memory.work, &mut memory.samples);
-            for (sum, sample) in sums.pixels.iter_mut().zip(&memory.samples) {
-                add(sum, sample);
+            if sums.count == 0 {
+                std::mem::swap(&mut sums.pixels, &mut memory.samples);
+                sums.pixels.iter_mut().for_each(begin);
+            } else {
+                sums.pixels.iter_mut().zip(&memory.samples).for_each(|(sum, sample)| add(sum, sample));
             }
             sums.count += 1;
         }
@@ -214,7 +216,7 @@ impl<S: Real> Job<'_, S> {
 
     /// Rounds over all tiles, each doubling the samples, until all have the wanted samples or little noise, or the
     /// time is over. Then calls `paint` for each tile that has samples.
-    fn rounds(&self, tiles: &[u32], paint: impl Fn(&Sums, &[(u32, u32)], &mut Patch) + Sync) -> Tally {
+    fn rounds(&self, tiles: &[u32], paint: impl Fn(&mut Sums, &[(u32, u32)], &mut Patch) + Sync) -> Tally {
         let (spp, limit) = (self.options.spp, self.options.time_limit.unwrap_or(f64::INFINITY));
         let in_time = || self.start.elapsed().as_secs_f64() < limit;
         let mut states: Vec<(u32, Sums, bool)> = tiles.iter().map(|&tile| (tile, Sums::default(), false)).collect();
@@ -224,9 +226,6 @@ impl<S: Real> Job<'_, S> {
             let one_tile = |memory: &mut TileMemory<S>, (tile, sums, is_done): &mut (u32, Sums, bool)| {
                 if *is_done {
                     return Tally::default();
-                }
-                if sums.count == 0 {
-                    sums.start(self.tiling.rays_per_tile());
                 }
                 // The first samples are made even when the time is over: every pixel has some.
                 while sums.count < target && (sums.count == 0 || in_time()) {
@@ -245,7 +244,7 @@ impl<S: Real> Job<'_, S> {
             }
             target = target.saturating_mul(2).min(spp);
         }
-        let finished = |memory: &mut TileMemory<S>, (tile, sums, _): &(u32, Sums, bool)| {
+        let finished = |memory: &mut TileMemory<S>, (tile, sums, _): &mut (u32, Sums, bool)| {
             if sums.count == 0 {
                 return Tally::default();
             }
@@ -253,13 +252,13 @@ impl<S: Real> Job<'_, S> {
             paint(sums, &memory.pixels, &mut memory.patch);
             Tally { done: 1, ..Tally::default() }
         };
-        let painted = states.par_iter().map_init(TileMemory::default, finished);
+        let painted = states.par_iter_mut().map_init(TileMemory::default, finished);
         total.plus(painted.reduce(Tally::default, Tally::plus))
     }
 
-    /// Takes what the planes get from a finished tile.
-    fn fill(&self, patch: &mut Patch, sums: &Sums, pixels: &[(u32, u32)]) {
-        let means = sums.pixels.iter().map(|sum| mean(sum, sums.count));
-        patch.fill(&self.channels, self.window, pixels.iter().copied().zip(means));
+    /// Takes what the planes get from a finished tile, whose sums become means.
+    fn fill(&self, patch: &mut Patch, sums: &mut Sums, pixels: &[(u32, u32)]) {
+        sums.pixels.iter_mut().for_each(|sum| *sum = mean(sum, sums.count));
+        patch.fill(&self.channels, self.window, pixels, &sums.pixels);
     }
 }

@@ -75,7 +75,9 @@ struct Ready {
     back: Look,
     /// Whether a texture changes the look.
     is_textured: bool,
-    /// Whether all points of it look the same from both sides and shine not.
+    /// Whether all points of it look the same, and shine not.
+    is_even: bool,
+    /// Whether they also look the same from both sides.
     is_uniform: bool,
 }
 
@@ -133,6 +135,14 @@ impl<'a> Looks<'a> {
     pub fn uniform(&self, id: u32) -> Option<&Look> {
         let ready = &self.entry(id).1;
         ready.is_uniform.then_some(&ready.front)
+    }
+
+    /// What every point of material `id` scatters with that is seen from the side of its normal (`from_front`) or from
+    /// behind, if that is the same everywhere, none shines, and no normal map bends the surface.
+    #[inline]
+    pub fn even(&self, id: u32, from_front: bool) -> Option<&Look> {
+        let ready = &self.entry(id).1;
+        ready.is_even.then_some(if from_front { &ready.front } else { &ready.back })
     }
 
     /// What material `id` (no mixture) scatters with at `surface`; `from_front`: seen from the side of its normal.
@@ -255,14 +265,16 @@ impl Ready {
     fn new(material: &Material) -> Self {
         let t = &material.textures;
         let is_textured = t.base.is_some() || t.metallic_roughness.is_some() || t.transmission.is_some();
-        let is_uniform = !is_textured
+        let is_even = !is_textured
             && t.normal.is_none()
             && material.emission == DVec3::ZERO
+            && !matches!(material.scattering, Scattering::Mix { .. });
+        let is_uniform = is_even
             && matches!(
                 material.scattering,
                 Scattering::Matte | Scattering::Plastic { .. } | Scattering::MetallicRoughness { .. }
             );
-        Self { front: constant(material, true), back: constant(material, false), is_textured, is_uniform }
+        Self { front: constant(material, true), back: constant(material, false), is_textured, is_even, is_uniform }
     }
 }
 

@@ -10,11 +10,11 @@ use glam::DVec3;
 use crate::lanes::Real;
 
 /// Roundings of the ray (origin, direction, t) between the true hit and ours, in units of S::EPSILON.
-const RAY_ROUNDINGS: f64 = 16.0;
+pub(super) const RAY_ROUNDINGS: f64 = 16.0;
 /// Roundings of the primitive: its vertices, and their differences to the origin. A triangle that is large against
 /// its distance from the eye puts its rounding errors next to the eye. (tests/render_offsets.rs: 2 leave one hit in
 /// 100 behind a surface, 4 one in 10^5.)
-const PRIMITIVE_ROUNDINGS: f64 = 8.0;
+pub(super) const PRIMITIVE_ROUNDINGS: f64 = 8.0;
 
 /// Bound of the error of a hit point, per axis, scene units: `position` = `org + t dir` was found in precision `S`
 /// from a primitive whose coordinates reach `magnitude` (not negative). (gamma_n of Higham's analysis times what was

@@ -87,6 +87,7 @@ pub struct Workspace<S> {
     pub(super) occluded: Vec<u8>,
     again: Again<S>,
     pub(super) paths: PathMemory<S>,
+    pub(super) rt: super::rt::Memory<S>,
     block: Rays<S>,
     block_hits: Hits<S>,
 }
@@ -105,6 +106,7 @@ impl<S: Real> Default for Workspace<S> {
             occluded: Vec::new(),
             again: Again::default(),
             paths: PathMemory::default(),
+            rt: super::rt::Memory::default(),
             block: Rays::new(0),
             block_hits: Hits::new(0),
         }

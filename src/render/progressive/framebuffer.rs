@@ -108,7 +108,7 @@ mod tests {
         let mut patch = Patch::default();
         let mut put = |frame: &mut Framebuffer, pixel, value| {
             let gray = Sample { radiance: DVec3::splat(value), ..Sample::MISS };
-            patch.fill(&channels, window, [(pixel, gray)]);
+            patch.fill(&channels, window, &[pixel], &[gray]);
             frame.paint(&patch);
         };
         assert_eq!((frame.shown(3, 5), frame.left()), (None, 81));

@@ -27,7 +27,7 @@ pub use steps::{LARGEST_BLOCK, Step};
 use super::aov::Channel;
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{Patch, channels, empty_film};
-use super::pixels::{add, mean};
+use super::pixels::{begin, mean};
 use super::scheduler::RenderOutput;
 use super::tally::Tally;
 use crate::camera::{Camera, PixelRect, Tiling, fill_pixels, fill_tile, morton_decode};
@@ -246,13 +246,11 @@ impl<'a, S: Real> Progressive<'a, S> {
             if self.options.spp > 1 {
                 self.keep_first(&memory.pixels, &memory.samples);
             }
-            let first = |sample: &Sample| {
-                let mut sum = Sample::MISS;
-                add(&mut sum, sample);
-                mean(&sum, 1)
-            };
-            let values = memory.pixels.iter().copied().zip(memory.samples.iter().map(first));
-            memory.patch.fill(&self.channels, self.window, values);
+            for sample in &mut memory.samples {
+                begin(sample);
+                *sample = mean(sample, 1);
+            }
+            memory.patch.fill(&self.channels, self.window, &memory.pixels, &memory.samples);
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
             self.told(watch, frame, lattice.part(batch), memory)
@@ -305,8 +303,9 @@ impl<'a, S: Real> Progressive<'a, S> {
                 tile.sums.add_all(seen);
                 tile.samples += 1;
             }
-            let means = (0..memory.pixels.len()).map(|pixel| mean(&tile.sums.of(pixel), samples));
-            memory.patch.fill(&self.channels, self.window, memory.pixels.iter().copied().zip(means));
+            memory.samples.clear();
+            memory.samples.extend((0..memory.pixels.len()).map(|pixel| mean(&tile.sums.of(pixel), samples)));
+            memory.patch.fill(&self.channels, self.window, &memory.pixels, &memory.samples);
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
             if samples == self.options.spp {

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use super::bot;
 use super::pipe;
 use super::solid::Solid;
 use crate::scene::solids::{self, NodeId, NodeKind, Placed, Polyhedron, SolidNode, SolidTree};
@@ -52,7 +53,10 @@ pub(super) fn add(tree: &mut SolidTree, solid: &Solid, place: &DAffine3) -> Resu
             let polyhedron = Polyhedron::from_planes(planes)?;
             tree.solid(polyhedron_at(polyhedron, *place))
         }
-        Solid::Eto { .. } | Solid::Bot { .. } => return Err(format!("the kind `{}` is not supported", solid.kind())),
+        Solid::Bot { mode, vertices, faces } => {
+            tree.solid(Placed { solid: bot::solid(*mode, vertices, faces)?, transform: *place })
+        }
+        Solid::Eto { .. } => return Err(format!("the kind `{}` is not supported", solid.kind())),
     };
     Ok(node)
 }
@@ -114,6 +118,7 @@ pub(super) fn bounds(solid: &Solid, place: &DAffine3) -> Option<(DVec3, DVec3)> 
             Some((point(*v) - reach, point(*v) + reach))
         }
         Solid::Half { .. } => None,
+        Solid::Bot { vertices, .. } => hull(vertices.iter().map(|&p| point(p))),
         _ => {
             let mut tree = SolidTree::new("");
             add(&mut tree, solid, place).ok()?;

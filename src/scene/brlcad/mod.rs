@@ -8,6 +8,7 @@
 //! below 256 bytes per byte of the file while reading; a walk ends with an error at [`regions::MAX_LEAVES`].
 
 mod boolean;
+mod bot;
 mod boxes;
 pub mod describe;
 mod lines;

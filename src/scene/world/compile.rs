@@ -5,6 +5,7 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
+use super::facets::Facets;
 use super::runs::Runs;
 use super::{Class, Counts, Instance, Object, PlacedSolid, World, solids, successor};
 use crate::bvh::{self, BuildSettings, LEAF_PRIMS, Leaf, Preset, Tree};
@@ -57,9 +58,21 @@ impl<S: Real> World<S> {
         }
         let instances: Vec<_> = assembly.placements.iter().map(|p| instance(p, &objects)).collect();
         let (top, top_blocks, unbounded_instances) = upper_tree(&instances, settings.preset);
-        let runs = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
+        let runs: Vec<Runs> = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
+        let facets = assembly.objects.iter().zip(&runs).map(|(o, runs)| Facets::new(o, runs)).collect();
         let build_seconds = start.elapsed().as_secs_f64();
-        Ok(Self { assembly, objects, instances, top, top_blocks, unbounded_instances, runs, counts, build_seconds })
+        Ok(Self {
+            assembly,
+            objects,
+            instances,
+            top,
+            top_blocks,
+            unbounded_instances,
+            runs,
+            facets,
+            counts,
+            build_seconds,
+        })
     }
 }
 

@@ -4,6 +4,7 @@
 //! instance is the identity is traced without an upper tree.
 
 mod compile;
+mod facets;
 mod runs;
 mod solids;
 mod successor;
@@ -12,8 +13,10 @@ mod surface;
 use glam::DVec3;
 
 pub use crate::bvh::{BuildSettings, Preset};
+pub use facets::Met;
 pub use surface::Surface;
 
+use self::facets::Facets;
 use self::runs::Runs;
 use super::assembly::Assembly;
 use super::description::Shape;
@@ -135,6 +138,8 @@ pub struct World<S> {
     pub unbounded_instances: Vec<u32>,
     /// Per object: its runs.
     runs: Vec<Runs>,
+    /// Per object: normals of its shapes and solids.
+    facets: Vec<Facets<S>>,
     /// By object.
     counts: Vec<Counts>,
     build_seconds: f64,

@@ -77,22 +77,23 @@ impl Runs {
     /// The run of primitive `prim`.
     #[inline]
     pub fn of(&self, prim: u32) -> Run {
-        self.list[self.find(prim)]
+        self.find(prim).1
     }
 
     /// The same, and of a shape or a leaf of solids its place in the object's space, if that is kept.
     #[inline]
     pub fn placed(&self, prim: u32) -> (Run, Option<&Place>) {
-        let at = self.find(prim);
-        (self.list[at], self.places.get(at).and_then(Option::as_ref))
+        let (at, run) = self.find(prim);
+        (run, self.places.get(at).and_then(Option::as_ref))
     }
 
+    /// The run of primitive `prim` and its number.
     #[inline]
-    fn find(&self, prim: u32) -> usize {
+    pub fn find(&self, prim: u32) -> (usize, Run) {
         let cell = (prim >> self.shift) as usize;
         let (low, high) = (self.starts[cell] as usize, self.starts[cell + 1] as usize);
         let after = self.list[low + 1..=high].partition_point(|run| run.first <= prim);
-        low + after
+        (low + after, self.list[low + after])
     }
 
     /// All of them, in order.

@@ -6,8 +6,9 @@ use super::runs::Place;
 use super::{World, solids};
 use crate::lanes::Real;
 use crate::math::normal_to_world;
-use crate::scene::assembly::PartKind;
+use crate::scene::assembly::{Part, PartKind};
 use crate::scene::mesh::Mesh;
+use crate::scene::solids::flat::FlatLeaf;
 
 /// A hit point with what shading needs, f64, world space.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +60,7 @@ impl<S: Real> World<S> {
         // In an instance that stays where its object is, places in the object are places in the world.
         let kept = kept.filter(|_| stands);
         let to_world = if is_plain { DAffine3::IDENTITY } else { placement.to_world * part.to_object };
-        let spread = |local: DVec3| through(&placement.to_world, through(&part.to_object, local));
+        let placed = |magnitude: DVec3| if stands { magnitude } else { through(&placement.to_world, magnitude) };
         match &part.kind {
             PartKind::Mesh(mesh) => {
                 let index = (prim - part.first_prim) as usize;
@@ -71,7 +72,11 @@ impl<S: Real> World<S> {
                 let (position, ng, magnitude) = if is_plain {
                     (local, cross.normalize_or_zero(), size)
                 } else {
-                    (to_world.transform_point3(local), normal_to_world(&to_world, cross), spread(size))
+                    (
+                        to_world.transform_point3(local),
+                        normal_to_world(&to_world, cross),
+                        placed(through(&part.to_object, size)),
+                    )
                 };
                 let on = OnTriangle { mesh, index, weights, to_world };
                 let ns = on.shading_normal().map_or(ng, |ns| if ns.dot(ng) < 0.0 { -ns } else { ns });
@@ -81,18 +86,33 @@ impl<S: Real> World<S> {
                 let position = org + dir * t;
                 let place = kept.copied().unwrap_or_else(|| Place::new(&to_world));
                 let ng = place.normal(solids::shape_normal(shape, place.local(position), u as u32));
-                Surface { position, ng, ns: ng, magnitude: spread(DVec3::ONE), material, triangle: None }
+                Surface { position, ng, ns: ng, magnitude: placed(shape_magnitude(part)), material, triangle: None }
             }
             PartKind::Solids(tree) => {
                 let leaf = &tree.leaves[(prim - part.first_prim) as usize];
                 let position = org + dir * t;
-                let (lo, hi) = leaf.solid.bounds();
-                let size = lo.abs().max(hi.abs());
-                let magnitude = spread(through(&leaf.to_tree, if size.is_finite() { size } else { DVec3::ONE }));
+                let magnitude = placed(leaf_magnitude(part, leaf));
                 let place = kept.copied().unwrap_or_else(|| Place::new(&(to_world * leaf.to_tree)));
                 let outward = place.normal(solids::solid_normal(&leaf.solid, place.local(position), u as u32));
                 let ng = if v > 0.5 { -outward } else { outward };
                 Surface { position, ng, ns: ng, magnitude, material, triangle: None }
+            }
+        }
+    }
+
+    /// `point`, in the space of `object`, in that of its shape or leaf `prim`; as it is for triangles.
+    pub fn local(&self, object: u32, prim: u32, point: DVec3) -> DVec3 {
+        let (run, kept) = self.runs[object as usize].placed(prim);
+        if let Some(place) = kept {
+            return place.local(point);
+        }
+        let part = &self.assembly.objects[object as usize].parts[run.part as usize];
+        match &part.kind {
+            PartKind::Mesh(_) => point,
+            PartKind::Shape(_) => Place::new(&part.to_object).local(point),
+            PartKind::Solids(tree) => {
+                let leaf = &tree.leaves[(prim - part.first_prim) as usize];
+                Place::new(&(part.to_object * leaf.to_tree)).local(point)
             }
         }
     }
@@ -206,6 +226,18 @@ impl OnTriangle<'_> {
             (along, if side > 0.0 { -1.0 } else { 1.0 })
         })
     }
+}
+
+/// Bound of the coordinates of the shape that `part` is, in the object's space.
+pub(super) fn shape_magnitude(part: &Part) -> DVec3 {
+    through(&part.to_object, DVec3::ONE)
+}
+
+/// The same of a leaf of the solids that `part` is.
+pub(super) fn leaf_magnitude(part: &Part, leaf: &FlatLeaf) -> DVec3 {
+    let (lo, hi) = leaf.solid.bounds();
+    let size = lo.abs().max(hi.abs());
+    through(&part.to_object, through(&leaf.to_tree, if size.is_finite() { size } else { DVec3::ONE }))
 }
 
 /// Largest coordinates of the images under `map` of points with coordinates up to `magnitude`.

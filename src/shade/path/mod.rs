@@ -17,6 +17,7 @@ mod emitter;
 mod lights;
 mod points;
 mod scatter;
+mod shapes;
 mod sky;
 mod wave;
 
@@ -31,11 +32,9 @@ use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
 };
 use self::lights::Lights;
-use self::points::{
-    BASE, FIELDS, NORMAL, OFFSET, OUT, PARAM, POSITION, Points, RAW_CORNER, RAW_EDGE1, RAW_EDGE2, RAW_PLACE, SHADING,
-    SQUEEZE, THROUGHPUT,
-};
+use self::points::{BASE, FIELDS, NORMAL, OFFSET, OUT, PARAM, POSITION, Points, SHADING, SQUEEZE, THROUGHPUT};
 use self::scatter::Chances;
+use self::shapes::ShapePoints;
 use self::wave::{Shadows, Wave};
 use super::look::{Look, Looks, Model};
 use super::offset::position_error;
@@ -44,7 +43,7 @@ use super::shader::{Settings, Workspace};
 use super::stats::BounceStats;
 use super::through::{Again, MIXTURE, Through, number};
 use crate::camera::sobol::PixelPoints;
-use crate::lanes::{Real, dot};
+use crate::lanes::Real;
 use crate::ray::{Hits, Rays};
 use crate::scene::description::Description;
 use crate::scene::world::{Surface, World};
@@ -65,12 +64,15 @@ pub(super) struct Paths<'a, S: Real> {
     /// Whether properties of first hits are wanted besides radiance.
     first_hits: bool,
     shadow_end: S,
+    /// Whether some hits come out of the world in lanes.
+    has_facets: bool,
 }
 
 /// One thread's arrays, reused from wave to wave.
 #[derive(Debug)]
 pub(super) struct PathMemory<S> {
     points: [Points<S>; Model::COUNT],
+    shapes: ShapePoints<S>,
     pixels: Vec<PixelPoints>,
     now: Wave<S>,
     next: Wave<S>,
@@ -82,6 +84,7 @@ impl<S: Real> Default for PathMemory<S> {
     fn default() -> Self {
         Self {
             points: std::array::from_fn(|_| Points::default()),
+            shapes: ShapePoints::default(),
             pixels: Vec::new(),
             now: Wave::default(),
             next: Wave::default(),
@@ -104,7 +107,8 @@ impl<'a, S: Real> Paths<'a, S> {
         let lights = Lights::new(world, description, &looks);
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
         let Settings { depth, seed, first_hits, .. } = *settings;
-        Self { world, engine, looks, lights, depth, seed, first_hits, shadow_end }
+        let has_facets = world.has_facets();
+        Self { world, engine, looks, lights, depth, seed, first_hits, shadow_end, has_facets }
     }
 
     /// The radiance along each ray of the primary batch `rays` into `out`, which holds misses; see
@@ -149,6 +153,7 @@ impl<'a, S: Real> Paths<'a, S> {
         });
         let traced = clock.elapsed();
         memory.points.iter_mut().for_each(Points::clear);
+        memory.shapes.set(self.has_facets.then_some(self.world), &memory.now.rays, &work.hits);
         for i in 0..memory.now.path.len() {
             self.arrive(i, bounce, sample, memory, &work.hits, out);
         }
@@ -244,16 +249,27 @@ impl<'a, S: Real> Paths<'a, S> {
             return;
         }
         let (prim, inst) = (hits.prim[i], hits.inst[i]);
+        let first_seen = |material: u32, seen: &mut Sample| {
+            if bounce == 0 {
+                seen.alpha = 1.0;
+                if self.first_hits {
+                    self.met(i, org, dir, hits).resolved(self, material, dir).show(i, dir, hits, seen);
+                }
+            }
+        };
         if bounce < self.depth {
+            if let Some((material, from_front)) = memory.shapes.get(i)
+                && let Some(look) = self.looks.even(material, from_front)
+            {
+                first_seen(material, seen);
+                let fields = memory.shapes.fields(i, wave, look);
+                memory.points[look.model as usize].push(path, &fields, false);
+                return;
+            }
             let bare = self.world.bare_triangle(prim, inst);
             if let (Some(triangle), Some(look)) = (bare.triangle, self.looks.uniform(bare.material)) {
-                if bounce == 0 {
-                    seen.alpha = 1.0;
-                    if self.first_hits {
-                        self.met(i, org, dir, hits).resolved(self, bare.material, dir).show(i, dir, hits, seen);
-                    }
-                }
-                let fields = raw_fields(wave, i, hits, &triangle, look);
+                first_seen(bare.material, seen);
+                let fields = wave.raw_fields(i, hits, &triangle, look);
                 memory.points[look.model as usize].push(path, &fields, true);
                 return;
             }
@@ -350,28 +366,6 @@ impl Arrival<'_> {
         seen.albedo = self.look.base;
         (seen.inst, seen.prim, seen.material) = (hits.inst[i], hits.prim[i], self.surface.material);
     }
-}
-
-/// The fields of a point on a bare triangle; the rest is computed in packets.
-#[inline]
-fn raw_fields<S: Real>(wave: &Wave<S>, i: usize, hits: &Hits<S>, triangle: &[DVec3; 3], look: &Look) -> [S; FIELDS] {
-    let mut fields = [S::ZERO; FIELDS];
-    let mut put = |at: usize, v: DVec3| (0..3).for_each(|axis| fields[at + axis] = S::from_f64(v[axis]));
-    put(RAW_CORNER, triangle[0]);
-    put(RAW_EDGE1, triangle[1]);
-    put(RAW_EDGE2, triangle[2]);
-    put(BASE, look.base);
-    let dir = wave.rays.dir(i);
-    let length = dot(dir, dir).sqrt();
-    let back = -(S::ONE / length);
-    (0..3).for_each(|axis| fields[OUT + axis] = dir[axis] * back);
-    (0..4).for_each(|k| fields[PARAM + k] = S::from_f64(look.param[k]));
-    fields[RAW_PLACE] = hits.u[i];
-    fields[RAW_PLACE + 1] = hits.v[i];
-    fields[RAW_PLACE + 2] = hits.t[i] * length;
-    fields[THROUGHPUT..THROUGHPUT + 3].copy_from_slice(&wave.throughput[i]);
-    fields[SQUEEZE] = wave.squeeze[i];
-    fields
 }
 
 impl<S: Real> PathMemory<S> {

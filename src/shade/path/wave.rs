@@ -1,7 +1,13 @@
 //! The rays of one bounce of many paths, with what they carry, and the shadow rays that go with them.
 
-use crate::lanes::Real;
-use crate::ray::Rays;
+use glam::DVec3;
+
+use super::points::{
+    BASE, FIELDS, Fields, OUT, PARAM, RAW_CORNER, RAW_EDGE1, RAW_EDGE2, RAW_PLACE, SQUEEZE, THROUGHPUT,
+};
+use crate::lanes::{Real, dot};
+use crate::ray::{Hits, Rays};
+use crate::shade::look::Look;
 
 /// Rays and what their paths carry, in parallel.
 #[derive(Clone, Debug)]
@@ -46,6 +52,28 @@ impl<S: Real> Wave<S> {
     /// Ends the additions.
     pub fn close(&mut self) {
         self.rays.truncate(self.path.len());
+    }
+
+    /// The fields of the point on a bare triangle that ray `i` met; the rest is computed in packets.
+    #[inline]
+    pub fn raw_fields(&self, i: usize, hits: &Hits<S>, triangle: &[DVec3; 3], look: &Look) -> Fields<S> {
+        let mut fields = [S::ZERO; FIELDS];
+        let mut put = |at: usize, v: DVec3| (0..3).for_each(|axis| fields[at + axis] = S::from_f64(v[axis]));
+        put(RAW_CORNER, triangle[0]);
+        put(RAW_EDGE1, triangle[1]);
+        put(RAW_EDGE2, triangle[2]);
+        put(BASE, look.base);
+        let dir = self.rays.dir(i);
+        let length = dot(dir, dir).sqrt();
+        let back = -(S::ONE / length);
+        (0..3).for_each(|axis| fields[OUT + axis] = dir[axis] * back);
+        (0..4).for_each(|k| fields[PARAM + k] = S::from_f64(look.param[k]));
+        fields[RAW_PLACE] = hits.u[i];
+        fields[RAW_PLACE + 1] = hits.v[i];
+        fields[RAW_PLACE + 2] = hits.t[i] * length;
+        fields[THROUGHPUT..THROUGHPUT + 3].copy_from_slice(&self.throughput[i]);
+        fields[SQUEEZE] = self.squeeze[i];
+        fields
     }
 }
 

@@ -2,7 +2,9 @@
 
 use glam::DVec3;
 
-use super::{AIR, Found, Path, Within};
+use super::level::{Found, Level};
+use super::{AIR, Carry, Path, Within};
+use crate::lanes::Real;
 
 /// Gaps of air thinner than this, mm, do not count as air.
 pub(super) const AIR_GAP: f64 = 0.01;
@@ -24,24 +26,27 @@ pub(super) fn refract(dir: DVec3, normal: DVec3, from: f64, to: f64) -> Result<D
     Ok((dir * ratio + n * (ratio * cosine - rest.sqrt())).normalize())
 }
 
-/// A path inside glass has met something: it leaves, or is reflected and goes on inside.
-pub(super) fn step(path: &Path, found: &Found, next: &mut Vec<Path>) {
-    let Some(within) = path.within else { return };
+/// Path `i` of `level`, inside glass, has met something: it leaves, or is reflected and goes on inside.
+pub(super) fn step<S: Real>(level: &Level<S>, i: usize, found: &Found<S>, next: &mut Vec<Path>) {
+    let path = level.path(i);
+    let Some(within) = path.carry.within else { return };
     let escape = |org: DVec3, dir: DVec3| {
-        let left = Some(within.region);
-        Path { org, dir, level: path.level + 1, index: AIR, left, within: None, ..*path }
+        let (left, level) = (Some(within.region), path.carry.level + 1);
+        Path { org, dir, carry: Carry { level, index: AIR, left, within: None, ..path.carry } }
     };
-    match *found {
-        Found::Leaving { position, normal, .. } => match refract(path.dir, normal, within.index, AIR) {
-            Ok(dir) => next.push(escape(position, dir)),
-            Err(dir) if within.reflections < MAX_REFLECTIONS => {
-                let within = Some(Within { reflections: within.reflections + 1, ..within });
-                next.push(Path { org: position, dir, within, ..*path });
-            }
-            Err(_) => next.push(escape(position, path.dir)),
-        },
+    if !found.is_hit(i) || !found.is_leaving(i) {
         // Something else is in the glass, or the ray only grazed it.
-        _ => next.push(escape(path.org, path.dir)),
+        next.push(escape(path.org, path.dir));
+        return;
+    }
+    let position = found.position(i);
+    match refract(path.dir, found.normal(i), within.index, AIR) {
+        Ok(dir) => next.push(escape(position, dir)),
+        Err(dir) if within.reflections < MAX_REFLECTIONS => {
+            let within = Some(Within { reflections: within.reflections + 1, ..within });
+            next.push(Path { org: position, dir, carry: Carry { within, ..path.carry } });
+        }
+        Err(_) => next.push(escape(position, path.dir)),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::pattern::Pattern;
+use super::pattern::{Face, Pattern};
 use crate::scene::brlcad::describe::{Look, Looks};
 use crate::scene::brlcad::shader::Shader;
 
@@ -32,14 +32,14 @@ pub(super) struct RtMaterial {
     pub finish: Option<Finish>,
     /// Whether it is a light.
     pub is_light: bool,
-    /// For regions of one arb: its corners, for patterns.
-    arb: Option<Box<[DVec3; 8]>>,
+    /// For regions of one arb with a pattern: its faces.
+    faces: Vec<Face>,
 }
 
 impl RtMaterial {
     pub fn of(look: &Look) -> Self {
         let base = look.color.unwrap_or(DVec3::ONE);
-        let mut material = Self { base, pattern: None, finish: Some(PLASTIC), is_light: false, arb: look.arb.clone() };
+        let mut material = Self { base, pattern: None, finish: Some(PLASTIC), is_light: false, faces: Vec::new() };
         let Some(shader) = &look.shader else { return material };
         let layers = if shader.name == "stack" { shader.layers.as_slice() } else { std::slice::from_ref(shader) };
         material.finish = None;
@@ -49,6 +49,9 @@ impl RtMaterial {
                 None => material.finish = finish(layer).or(material.finish),
             }
             material.is_light |= layer.name == "light";
+        }
+        if let (Some(_), Some(corners)) = (&material.pattern, &look.arb) {
+            material.faces = Face::of_arb(corners);
         }
         // Unknown shaders are plastic.
         if material.finish.is_none() && material.pattern.is_none() && !material.is_light {
@@ -62,9 +65,9 @@ impl RtMaterial {
         self.pattern.as_ref().map_or(self.base, |pattern| pattern.color(uv().unwrap_or_default()))
     }
 
-    /// Corners of the arb that it is, if it has a pattern.
-    pub fn arb(&self) -> Option<&[DVec3; 8]> {
-        self.pattern.as_ref().and(self.arb.as_deref())
+    /// Faces of the arb that it is, if it has a pattern.
+    pub fn faces(&self) -> &[Face] {
+        &self.faces
     }
 }
 

@@ -7,10 +7,11 @@
 //! know the parameters of spheres, ellipsoids, half-spaces and regions of a single arb; elsewhere they see (0, 0).
 //!
 //! Like the other integrators, this one works on batches: a level of paths is one batch of rays, its shadow rays are
-//! compact batches of their own.
+//! compact batches of their own; normals and lighting are computed in lanes.
 
 mod glass;
 mod lamp;
+mod level;
 mod material;
 mod pattern;
 mod phong;
@@ -18,14 +19,17 @@ mod shadow;
 
 use glam::DVec3;
 
+use self::lamp::Lamp;
+use self::level::{Found, Level};
+use self::material::RtMaterial;
+use self::phong::Meetings;
+use self::shadow::Probes;
 use super::sample::Sample;
 use super::shader::{Shader, Workspace};
 use crate::camera::Camera;
-use crate::lanes::Real;
-use crate::ray::Rays;
+use crate::lanes::{Lanes, Real};
+use crate::ray::{Hits, Rays};
 use crate::scene::brlcad::describe::Looks;
-use lamp::Lamp;
-use material::RtMaterial;
 pub use material::unknown_shaders;
 use pattern::Pattern;
 
@@ -53,15 +57,22 @@ pub(super) struct Rt {
     unbounded: Vec<bool>,
 }
 
-/// A ray on its way, with what of its colour reaches the pixel.
-#[derive(Clone, Copy)]
+/// A ray on its way.
+#[derive(Clone, Copy, Debug)]
 struct Path {
-    /// Number of the primary ray.
-    pixel: u32,
     org: DVec3,
     /// Unit.
     dir: DVec3,
+    carry: Carry,
+}
+
+/// What a ray carries.
+#[derive(Clone, Copy, Debug)]
+struct Carry {
+    /// Number of the primary ray.
+    pixel: u32,
     level: u32,
+    /// What of its colour reaches the pixel.
     throughput: DVec3,
     /// Refractive index of where the ray is.
     index: f64,
@@ -71,8 +82,15 @@ struct Path {
     within: Option<Within>,
 }
 
+impl Carry {
+    /// Of a primary ray.
+    fn new(pixel: u32) -> Self {
+        Self { pixel, level: 0, throughput: DVec3::ONE, index: AIR, left: None, within: None }
+    }
+}
+
 /// A ray inside glass.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Within {
     region: u32,
     /// Refractive index of the glass.
@@ -81,27 +99,20 @@ struct Within {
     reflections: u32,
 }
 
-/// Where a path meets a region from outside.
-#[derive(Clone, Copy)]
-struct Meeting {
-    path: Path,
-    t: f64,
-    position: DVec3,
-    /// Unit, towards the viewer.
-    normal: DVec3,
-    region: u32,
-    /// The region's colour there.
-    base: DVec3,
-}
-
-/// What a ray found.
-enum Found {
-    /// Nothing.
-    Nothing,
-    /// The surface of region so-and-so, from outside.
-    Entering { t: f64, region: u32, prim: u32, position: DVec3, normal: DVec3 },
-    /// As above, from inside; the normal points out.
-    Leaving { t: f64, region: u32, position: DVec3, normal: DVec3 },
+/// One thread's arrays, reused from batch to batch.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory<S> {
+    level: Level<S>,
+    found: Found<S>,
+    meetings: Meetings<S>,
+    probes: Probes<S>,
+    next_probes: Probes<S>,
+    /// What shadow rays find, and rays that look back.
+    shadow: Found<S>,
+    /// Rays that look back.
+    back: Level<S>,
+    /// Of each vector of lanes: the primary rays that met something.
+    first: Vec<u32>,
 }
 
 impl Rt {
@@ -117,129 +128,129 @@ impl Rt {
 impl<S: Real> Shader<'_, S> {
     /// What each primary ray of `rays` sees in `rt`'s lighting model.
     pub(super) fn rt(&self, rt: &Rt, rays: &Rays<S>, work: &mut Workspace<S>, out: &mut [Sample]) {
-        let mut paths: Vec<Path> = (0..rays.len())
-            .filter(|&i| rays.is_live(i))
-            .map(|i| {
-                let org = DVec3::from(rays.org(i).map(S::to_f64));
-                let dir = DVec3::from(rays.dir(i).map(S::to_f64)).normalize();
-                let (pixel, throughput) = (i as u32, DVec3::ONE);
-                Path { pixel, org, dir, level: 0, throughput, index: AIR, left: None, within: None }
-            })
-            .collect();
-        let mut next = Vec::new();
+        let mut memory = std::mem::take(&mut work.rt);
+        memory.level.start(rays);
+        let (mut next, mut lost) = (Vec::new(), Vec::new());
         let mut is_primary = true;
-        while !paths.is_empty() {
-            let found = self.rt_trace(&paths, work);
+        while memory.level.len() > 0 {
+            self.intersect_all(&memory.level.rays, work);
+            memory.found.set(self.world, &memory.level.rays, &work.hits);
             if !is_primary {
-                work.rays.mirror += paths.len() as u64;
-            }
-            let mut meetings = Vec::new();
-            let mut lost = Vec::new();
-            for (path, found) in paths.iter().zip(found) {
-                if is_primary {
-                    see(&mut out[path.pixel as usize], &found);
-                }
-                if path.within.is_some() {
-                    glass::step(path, &found, &mut next);
-                    continue;
-                }
-                match found {
-                    Found::Nothing => lost.push(*path),
-                    Found::Leaving { t, region, position, .. } if path.left == Some(region) && t < THIN => {
-                        next.push(Path { org: position, left: None, ..*path });
-                    }
-                    Found::Leaving { .. } => {
-                        let color = INSIDE.0 * INSIDE.1.powi((MAX_BOUNCES + 1).saturating_sub(path.level) as i32);
-                        out[path.pixel as usize].radiance += path.throughput * color;
-                    }
-                    Found::Entering { t, region, prim, position, normal } => {
-                        let material = &rt.materials[region as usize];
-                        let of_arb = || pattern::uv_of_arb(material.arb()?, position, normal);
-                        let part = &self.world.assembly.objects[0].parts[region as usize];
-                        let base = material.color(|| pattern::uv(part, prim, position, normal).or_else(of_arb));
-                        meetings.push(Meeting { path: *path, t, position, normal, region, base });
-                    }
+                work.rays.mirror += memory.level.len() as u64;
+            } else {
+                memory.first.clone_from(&memory.found.hit);
+                if self.settings.first_hits {
+                    see(&memory.found, out);
                 }
             }
-            self.rt_lost(rt, &lost, work, out);
-            self.rt_light(rt, &meetings, &mut next, work, out);
-            paths = std::mem::take(&mut next);
+            self.rt_sort(rt, &mut memory, &work.hits, &mut next, &mut lost, out);
+            self.rt_lost(rt, &lost, &mut memory, work, out);
+            self.rt_light(rt, &mut memory, &mut next, work, out);
+            memory.level.open(&next);
+            next.clear();
+            lost.clear();
             is_primary = false;
         }
-        for sample in out.iter_mut().filter(|sample| sample.alpha > 0.0 && sample.prim != crate::ray::INVALID_ID) {
-            sample.radiance = not_the_background(sample.radiance);
+        for (first, hit) in (0..out.len()).step_by(S::Wide::N).zip(&memory.first) {
+            let samples = out[first..].iter_mut().take(S::Wide::N).enumerate();
+            samples.filter(|(lane, _)| hit >> lane & 1 != 0).for_each(|(_, sample)| not_the_background(sample));
+        }
+        work.rt = memory;
+    }
+
+    /// Tells the hits of a level apart: paths that meet nothing go to `lost`, those that go on as they are to `next`,
+    /// those that enter regions to the meetings.
+    fn rt_sort(
+        &self,
+        rt: &Rt,
+        memory: &mut Memory<S>,
+        hits: &Hits<S>,
+        next: &mut Vec<Path>,
+        lost: &mut Vec<u32>,
+        out: &mut [Sample],
+    ) {
+        let Memory { level, found, meetings, .. } = memory;
+        meetings.open(level.rays.padded_len());
+        for i in 0..level.len() {
+            if !level.is_live(i) {
+                continue;
+            }
+            let carry = level.carry(i);
+            out[carry.pixel as usize].alpha = 1.0;
+            if carry.within.is_some() {
+                glass::step(level, i, found, next);
+            } else if !found.is_hit(i) {
+                lost.push(i as u32);
+            } else if found.is_leaving(i) {
+                if carry.left == Some(found.region[i]) && found.t[i].to_f64() < THIN {
+                    let path = level.path(i);
+                    next.push(Path { org: found.position(i), carry: Carry { left: None, ..carry }, ..path });
+                } else {
+                    let color = INSIDE.0 * INSIDE.1.powi((MAX_BOUNCES + 1).saturating_sub(carry.level) as i32);
+                    out[carry.pixel as usize].radiance += carry.throughput * color;
+                }
+            } else {
+                let region = found.region[i];
+                let material = &rt.materials[region as usize];
+                let base = material.color(|| {
+                    let (position, normal) = (found.position(i), found.normal(i));
+                    let of_arb = || pattern::uv_of_arb(material.faces(), position, normal);
+                    pattern::uv(self.world, region, hits.prim[i], position, normal).or_else(of_arb)
+                });
+                meetings.add(i, base);
+            }
         }
     }
 
     /// Rays that nothing stops: the surroundings, or the inside of a solid without end.
-    fn rt_lost(&self, rt: &Rt, lost: &[Path], work: &mut Workspace<S>, out: &mut [Sample]) {
-        let inside = self.rt_inside(rt, lost, work);
-        for (path, inside) in lost.iter().zip(inside) {
+    fn rt_lost(&self, rt: &Rt, lost: &[u32], memory: &mut Memory<S>, work: &mut Workspace<S>, out: &mut [Sample]) {
+        let Memory { level, back, shadow, .. } = memory;
+        let looks_back = rt.unbounded.contains(&true) && !lost.is_empty();
+        if looks_back {
+            // A ray that starts inside a region without bounds leaves it when it looks back.
+            let turned = |path: Path| Path { dir: -path.dir, ..path };
+            back.open(&lost.iter().map(|&i| turned(level.path(i as usize))).collect::<Vec<_>>());
+            self.intersect_all(&back.rays, work);
+            shadow.set(self.world, &back.rays, &work.hits);
+        }
+        // Rays of parallel projection all have one direction.
+        let mut last = (DVec3::ZERO, DVec3::ZERO);
+        for (k, &i) in lost.iter().enumerate() {
+            let inside = looks_back && shadow.is_leaving(k) && rt.unbounded[shadow.region[k] as usize];
             let color = match &rt.surroundings {
                 _ if inside => DVec3::splat(INSIDE.0),
-                Some(pattern) => pattern.color(pattern::uv_of_direction(path.dir)),
+                Some(pattern) => {
+                    let dir = level.path(i as usize).dir;
+                    if dir != last.0 {
+                        last = (dir, pattern.color(pattern::uv_of_direction(dir)));
+                    }
+                    last.1
+                }
                 None => BACKGROUND,
             };
-            let sample = &mut out[path.pixel as usize];
-            sample.radiance += path.throughput * color;
-            sample.alpha = 1.0;
+            let carry = level.carry(i as usize);
+            out[carry.pixel as usize].radiance += carry.throughput * color;
         }
-    }
-
-    /// Whether each ray starts inside a region without bounds: one that looks back leaves it.
-    fn rt_inside(&self, rt: &Rt, paths: &[Path], work: &mut Workspace<S>) -> Vec<bool> {
-        if !rt.unbounded.contains(&true) {
-            return vec![false; paths.len()];
-        }
-        let back: Vec<Path> = paths.iter().map(|path| Path { dir: -path.dir, ..*path }).collect();
-        let is_inside =
-            |found: &Found| matches!(found, Found::Leaving { region, .. } if rt.unbounded[*region as usize]);
-        self.rt_trace(&back, work).iter().map(is_inside).collect()
-    }
-
-    /// The first surface on each path.
-    fn rt_trace(&self, paths: &[Path], work: &mut Workspace<S>) -> Vec<Found> {
-        let mut batch = std::mem::take(&mut work.batch);
-        batch.reset(paths.len());
-        let (start, end) = (S::from_f64(TOLERANCE), S::from_f64(f64::INFINITY));
-        for (i, path) in paths.iter().enumerate() {
-            batch.set(i, path.org.to_array().map(S::from_f64), path.dir.to_array().map(S::from_f64), start, end);
-        }
-        self.intersect_all(&batch, work);
-        let found = (0..paths.len()).map(|i| self.rt_found(i, paths[i].org, paths[i].dir, work)).collect();
-        work.batch = batch;
-        found
-    }
-
-    /// Hit `i` of the last batch, whose ray was `org`, `dir`.
-    fn rt_found(&self, i: usize, org: DVec3, dir: DVec3, work: &Workspace<S>) -> Found {
-        let hits = &work.hits;
-        if !hits.is_hit(i) {
-            return Found::Nothing;
-        }
-        let (t, prim, inst) = (hits.t[i].to_f64(), hits.prim[i], hits.inst[i]);
-        let (u, v) = (hits.u[i].to_f64(), hits.v[i].to_f64());
-        let surface = self.world.surface(org, dir, t, u, v, prim, inst);
-        let region = self.world.part(self.world.assembly.placements[inst as usize].object, prim);
-        let (position, normal) = (surface.position, surface.ng);
-        if normal.dot(dir) > 0.0 {
-            return Found::Leaving { t, region, position, normal };
-        }
-        Found::Entering { t, region, prim, position, normal }
     }
 }
 
-/// What the pixel's other planes show of a primary ray.
-fn see(sample: &mut Sample, found: &Found) {
-    let (Found::Entering { t, region, normal, .. } | Found::Leaving { t, region, normal, .. }) = found else { return };
-    sample.alpha = 1.0;
-    sample.distance = *t;
-    sample.normal = *normal;
-    (sample.inst, sample.prim) = (0, *region);
+/// What the pixels' other planes show of the primary rays.
+fn see<S: Real>(found: &Found<S>, out: &mut [Sample]) {
+    for (i, sample) in out.iter_mut().enumerate().filter(|(i, _)| found.is_hit(*i)) {
+        sample.distance = found.t[i].to_f64();
+        sample.normal = found.normal(i);
+        (sample.inst, sample.prim) = (0, found.region[i]);
+    }
 }
 
 /// `rt` keeps the background's colour for the background: a hit of that very colour becomes one step bluer.
-fn not_the_background(color: DVec3) -> DVec3 {
-    let byte = |x: f64| (x * 255.0 + 0.5) as u8;
-    if [color.x, color.y, color.z].map(byte) == [0, 0, 1] { DVec3::new(0.0, 0.0, 2.0 / 255.0) } else { color }
+fn not_the_background(sample: &mut Sample) {
+    let color = sample.radiance;
+    // Most are brighter.
+    if color.max_element() * 255.0 < 1.5 {
+        let byte = |x: f64| (x * 255.0 + 0.5) as u8;
+        if [color.x, color.y, color.z].map(byte) == [0, 0, 1] {
+            sample.radiance = DVec3::new(0.0, 0.0, 2.0 / 255.0);
+        }
+    }
 }

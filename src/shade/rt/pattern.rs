@@ -8,11 +8,13 @@ use std::sync::LazyLock;
 
 use glam::DVec3;
 
-use crate::scene::assembly::{Part, PartKind};
+use crate::lanes::Real;
+use crate::scene::assembly::PartKind;
 use crate::scene::brlcad::ARB_FACES;
 use crate::scene::brlcad::shader::Shader;
 use crate::scene::description::Shape;
 use crate::scene::solids::Solid;
+use crate::scene::world::World;
 
 /// Entries of the table of sines.
 const SINES: usize = 2048;
@@ -109,15 +111,19 @@ pub(super) fn uv_of_direction(d: DVec3) -> [f64; 2] {
     [if u < 0.0 { u + 1.0 } else { u }, d.z.atan2(d.x.hypot(d.y)) / PI + 0.5]
 }
 
-/// Parameters of the surface of leaf `prim` of `part` at `position` with outward `normal`; `None` for solids without.
-pub(super) fn uv(part: &Part, prim: u32, position: DVec3, normal: DVec3) -> Option<[f64; 2]> {
+/// Parameters of the surface of leaf `prim` in region `region` at `position` with outward `normal`; `None` for solids
+/// without.
+pub(super) fn uv<S: Real>(
+    world: &World<S>,
+    region: u32,
+    prim: u32,
+    position: DVec3,
+    normal: DVec3,
+) -> Option<[f64; 2]> {
+    let part = &world.assembly.objects[0].parts[region as usize];
     let PartKind::Solids(tree) = &part.kind else { return None };
-    let leaf = &tree.leaves[(prim - part.first_prim) as usize];
-    match leaf.solid {
-        Solid::Shape(Shape::Sphere) => {
-            let to_local = (part.to_object * leaf.to_tree).inverse();
-            Some(uv_of_direction(to_local.transform_point3(position)))
-        }
+    match tree.leaves[(prim - part.first_prim) as usize].solid {
+        Solid::Shape(Shape::Sphere) => Some(uv_of_direction(world.local(0, prim, position))),
         Solid::Shape(Shape::HalfSpace) => Some(uv_of_plane(position, normal)),
         _ => None,
     }
@@ -142,19 +148,19 @@ fn uv_of_plane(position: DVec3, n: DVec3) -> [f64; 2] {
     })
 }
 
-/// Parameters of the face of an arb with corners `points` that `normal` belongs to, at `position`: they run from 0 to 1
-/// over the smallest rectangle along the face's first edge.
-pub(super) fn uv_of_arb(points: &[DVec3; 8], position: DVec3, normal: DVec3) -> Option<[f64; 2]> {
-    let faces = ARB_FACES.iter().filter_map(|face| Face::of(&face.map(|i| points[i])));
-    let along = |face: &Face| face.normal.dot(normal).abs();
+/// Parameters of that of an arb's `faces` that `normal` belongs to, at `position`: they run from 0 to 1 over the smallest
+/// rectangle along the face's first edge.
+pub(super) fn uv_of_arb(faces: &[Face], position: DVec3, normal: DVec3) -> Option<[f64; 2]> {
+    let along = |face: &&Face| face.normal.dot(normal).abs() > 0.999;
     let distance = |face: &Face| (position - face.origin).dot(face.normal).abs();
-    let best = faces.filter(|face| along(face) > 0.999).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let best = faces.iter().filter(along).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     let from = position - best.origin;
     Some([from.dot(best.u) / best.u_length, from.dot(best.v) / best.v_length])
 }
 
 /// A face of an arb with its axes.
-struct Face {
+#[derive(Clone, Debug)]
+pub(super) struct Face {
     origin: DVec3,
     normal: DVec3,
     u: DVec3,
@@ -164,6 +170,11 @@ struct Face {
 }
 
 impl Face {
+    /// The faces of the arb with corners `points`.
+    pub fn of_arb(points: &[DVec3; 8]) -> Vec<Self> {
+        ARB_FACES.iter().filter_map(|face| Self::of(&face.map(|i| points[i]))).collect()
+    }
+
     fn of(corners: &[DVec3; 4]) -> Option<Self> {
         let mut distinct: Vec<DVec3> = Vec::new();
         for &p in corners {
@@ -210,10 +221,11 @@ mod tests {
             [0.0, 3.0, 4.0],
         ]
         .map(DVec3::from);
-        let middle = uv_of_arb(&points, DVec3::new(1.0, 1.5, 4.0), DVec3::Z).unwrap();
+        let faces = Face::of_arb(&points);
+        let middle = uv_of_arb(&faces, DVec3::new(1.0, 1.5, 4.0), DVec3::Z).unwrap();
         assert!((middle[0] - 0.5).abs() < 1e-12 && (middle[1] - 0.5).abs() < 1e-12);
         let mut corners: Vec<[i64; 2]> =
-            points[4..].iter().map(|&p| uv_of_arb(&points, p, DVec3::Z).unwrap().map(|x| x.round() as i64)).collect();
+            points[4..].iter().map(|&p| uv_of_arb(&faces, p, DVec3::Z).unwrap().map(|x| x.round() as i64)).collect();
         corners.sort_unstable();
         assert_eq!(corners, [[0, 0], [0, 1], [1, 0], [1, 1]]);
     }

@@ -1,10 +1,9 @@
 //! Whether lights are seen from surfaces: one ray to the middle of each, through whatever lets light pass.
 
-use glam::DVec3;
-
-use super::lamp::Lamp;
-use super::{Found, Meeting, Rt, TOLERANCE};
+use super::level::Found;
+use super::{Rt, TOLERANCE};
 use crate::lanes::Real;
+use crate::ray::Rays;
 use crate::shade::shader::{Shader, Workspace};
 
 /// Partitions that begin at a ray's start and end before this, mm, are passed over.
@@ -12,15 +11,11 @@ const THIN_AT_START: f64 = 0.005;
 /// Light weaker than this is dark.
 const DARK: f64 = 0.01;
 
-/// A shadow ray on its way.
-#[derive(Clone, Copy)]
+/// What a shadow ray carries.
+#[derive(Clone, Copy, Debug)]
 struct Probe {
-    /// Number of its answer.
-    slot: usize,
-    org: DVec3,
-    dir: DVec3,
-    /// Where on the ray to go on.
-    from: f64,
+    /// Number of the ray whose hit it starts from.
+    slot: u32,
     /// What still passes.
     filter: f64,
     /// The region that the ray is passing through.
@@ -34,60 +29,74 @@ enum Verdict {
     GoesOn(Probe),
 }
 
-impl<S: Real> Shader<'_, S> {
-    /// How much of `lamp` reaches the meetings numbered `lit`: 0 to 1.
-    pub(super) fn rt_visible(
-        &self,
-        rt: &Rt,
-        lamp: &Lamp,
-        lit: &[usize],
-        meetings: &[Meeting],
-        work: &mut Workspace<S>,
-    ) -> Vec<f64> {
-        if lamp.region.is_none() {
-            return vec![1.0; lit.len()];
-        }
-        let mut answers = vec![0.0; lit.len()];
-        let probe = |(slot, &i): (usize, &usize)| {
-            let position = meetings[i].position;
-            let dir = (lamp.position - position).normalize();
-            Probe { slot, org: position + dir * TOLERANCE, dir, from: 0.0, filter: 1.0, within: None }
-        };
-        let mut probes: Vec<Probe> = lit.iter().enumerate().map(probe).collect();
-        while !probes.is_empty() {
-            let mut batch = std::mem::take(&mut work.batch);
-            batch.reset(probes.len());
-            for (i, probe) in probes.iter().enumerate() {
-                let (org, dir) = (probe.org.to_array().map(S::from_f64), probe.dir.to_array().map(S::from_f64));
-                batch.set(i, org, dir, S::from_f64(probe.from), S::from_f64(f64::INFINITY));
-            }
-            work.rays.shadow += probes.len() as u64;
-            self.intersect_all(&batch, work);
-            let mut on = Vec::new();
-            for (i, probe) in probes.iter().enumerate() {
-                match judge(rt, probe, &self.rt_found(i, probe.org, probe.dir, work)) {
-                    Verdict::Arrives => answers[probe.slot] = probe.filter,
-                    Verdict::Dark => {}
-                    Verdict::GoesOn(probe) => on.push(probe),
-                }
-            }
-            work.batch = batch;
-            probes = on;
-        }
-        answers
+/// Shadow rays on their way to one light.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Probes<S> {
+    rays: Rays<S>,
+    carry: Vec<Probe>,
+}
+
+impl<S: Real> Probes<S> {
+    /// None, with room for `count`.
+    pub fn open(&mut self, count: usize) {
+        self.rays.reset(count);
+        self.carry.clear();
+    }
+
+    /// Adds one from hit `slot`, towards the light at the unit direction `dir`.
+    #[inline]
+    pub fn push(&mut self, slot: u32, org: [S; 3], dir: [S; 3]) {
+        self.add(Probe { slot, filter: 1.0, within: None }, org, dir, S::ZERO);
+    }
+
+    fn add(&mut self, probe: Probe, org: [S; 3], dir: [S; 3], from: S) {
+        self.rays.set(self.carry.len(), org, dir, from, S::INFINITY);
+        self.carry.push(probe);
     }
 }
 
-fn judge(rt: &Rt, probe: &Probe, found: &Found) -> Verdict {
+impl<S: Real> Shader<'_, S> {
+    /// Follows `probes` to their end, using `next` on the way: how much of the light reaches each slot, 0 to 1, into
+    /// `visible`, which holds zeros.
+    pub(super) fn rt_visible(
+        &self,
+        rt: &Rt,
+        probes: &mut Probes<S>,
+        next: &mut Probes<S>,
+        found: &mut Found<S>,
+        visible: &mut [S],
+        work: &mut Workspace<S>,
+    ) {
+        let tolerance = S::from_f64(TOLERANCE);
+        while !probes.carry.is_empty() {
+            let count = probes.carry.len();
+            probes.rays.truncate(count);
+            work.rays.shadow += count as u64;
+            self.intersect_all(&probes.rays, work);
+            found.set(self.world, &probes.rays, &work.hits);
+            next.open(count);
+            for (i, probe) in probes.carry.iter().enumerate() {
+                match judge(rt, probe, i, found) {
+                    Verdict::Arrives => visible[probe.slot as usize] = S::from_f64(probe.filter),
+                    Verdict::Dark => {}
+                    Verdict::GoesOn(on) => {
+                        next.add(on, probes.rays.org(i), probes.rays.dir(i), found.t[i] + tolerance);
+                    }
+                }
+            }
+            std::mem::swap(probes, next);
+        }
+    }
+}
+
+fn judge<S: Real>(rt: &Rt, probe: &Probe, i: usize, found: &Found<S>) -> Verdict {
     // A light is a thing: a ray that meets nothing has missed it.
-    let (t, region, entering) = match *found {
-        Found::Nothing => return Verdict::Dark,
-        Found::Entering { t, region, .. } => (t, region, true),
-        Found::Leaving { t, region, .. } => (t, region, false),
-    };
-    let on = Probe { from: t + TOLERANCE, ..*probe };
-    if !entering && (probe.within == Some(region) || t < THIN_AT_START) {
-        return Verdict::GoesOn(Probe { within: None, ..on });
+    if !found.is_hit(i) {
+        return Verdict::Dark;
+    }
+    let (t, region, leaving) = (found.t[i].to_f64(), found.region[i], found.is_leaving(i));
+    if leaving && (probe.within == Some(region) || t < THIN_AT_START) {
+        return Verdict::GoesOn(Probe { within: None, ..*probe });
     }
     let material = &rt.materials[region as usize];
     if material.is_light {
@@ -97,5 +106,5 @@ fn judge(rt: &Rt, probe: &Probe, found: &Found) -> Verdict {
     if filter < DARK {
         return Verdict::Dark;
     }
-    Verdict::GoesOn(Probe { filter, within: entering.then_some(region), ..on })
+    Verdict::GoesOn(Probe { filter, within: (!leaving).then_some(region), ..*probe })
 }

@@ -1,0 +1,246 @@
+//! Normals of shapes and solids in lanes: on each face of nearly all of them the gradient is an affine function of the
+//! point, kept here in the object's space, so that one kernel does for all.
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use super::runs::{Run, Runs};
+use super::surface::{leaf_magnitude, shape_magnitude};
+use super::{World, solids};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, map3, space};
+use crate::math::NormalMap;
+use crate::ray::{Hits, INVALID_ID, Rays};
+use crate::scene::assembly::{AssemblyObject, PartKind};
+use crate::scene::description::Shape;
+use crate::scene::solids::Solid;
+
+/// Most facets that an object keeps.
+const MAX_FACETS: usize = 1 << 20;
+/// Numbers of a facet.
+const FIELDS: usize = 18;
+
+/// Outward normal of a face, not unit: `rows * (p - centre) + constant`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facet<S> {
+    /// Three rows, the centre, the constant, and the magnitude (see [`super::Surface::magnitude`]).
+    fields: [S; FIELDS],
+}
+
+impl<S: Real> Facet<S> {
+    /// Face `face` of a solid that `map` takes to the object; `None` where the gradient is not affine.
+    fn new(solid: &Solid, face: u32, map: &DAffine3, magnitude: DVec3) -> Option<Self> {
+        // The side of a taper is a quartic.
+        if matches!(solid, Solid::Taper { .. }) && face == 0 {
+            return None;
+        }
+        let gradient = |p: DVec3| solids::solid_normal(solid, p, face);
+        let at_zero = gradient(DVec3::ZERO);
+        let local = DMat3::from_cols_array_2d(&DVec3::AXES.map(|axis| (gradient(axis) - at_zero).to_array()));
+        let normals = NormalMap::new(map).matrix();
+        // Numbers of about one, whatever the map's scale.
+        let normals = normals * (1.0 / normals.to_cols_array().iter().fold(0.0f64, |most, x| most.max(x.abs())));
+        let rows = (normals * local * map.matrix3.inverse()).transpose();
+        let constant = normals * at_zero;
+        let mut fields = [S::ZERO; FIELDS];
+        let all = [rows.x_axis, rows.y_axis, rows.z_axis, map.translation, constant, magnitude];
+        for (field, x) in fields.iter_mut().zip(all.iter().flat_map(DVec3::to_array)) {
+            *field = S::from_f64(x);
+        }
+        fields.iter().all(|x| x.is_finite()).then_some(Self { fields })
+    }
+
+    /// A plane with this normal.
+    fn flat(normal: DVec3) -> Self {
+        let mut fields = [S::ZERO; FIELDS];
+        (0..3).for_each(|axis| fields[12 + axis] = S::from_f64(normal[axis]));
+        Self { fields }
+    }
+}
+
+/// The facets of one object's shapes and leaves.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Facets<S> {
+    /// `None` where the gradient is not affine.
+    list: Vec<Option<Facet<S>>>,
+    /// By run of the object: its first facet; then the one after its last.
+    first: Vec<u32>,
+}
+
+impl<S: Real> Facets<S> {
+    /// Of `object`, whose runs are `runs`.
+    pub fn new(object: &AssemblyObject, runs: &Runs) -> Self {
+        let mut facets = Self { list: Vec::new(), first: vec![0] };
+        for run in runs.list() {
+            let part = &object.parts[run.part as usize];
+            let before = facets.list.len();
+            let placed = match &part.kind {
+                PartKind::Shape(shape) => Some((Solid::Shape(*shape), part.to_object, shape_magnitude(part))),
+                PartKind::Solids(tree) => {
+                    let leaf = tree.leaves.get((run.first - part.first_prim) as usize);
+                    leaf.map(|leaf| (leaf.solid.clone(), part.to_object * leaf.to_tree, leaf_magnitude(part, leaf)))
+                }
+                PartKind::Mesh(_) => None,
+            };
+            if let Some((solid, map, magnitude)) = placed {
+                let count = faces(&solid).min((MAX_FACETS - before) as u32);
+                facets.list.extend((0..count).map(|face| Facet::new(&solid, face, &map, magnitude)));
+            }
+            facets.first.push(facets.list.len() as u32);
+        }
+        facets
+    }
+
+    #[inline(always)]
+    fn get(&self, run: usize, face: usize) -> Option<&Facet<S>> {
+        let (first, end) = (self.first[run] as usize, self.first[run + 1] as usize);
+        let at = first + face;
+        if at < end { self.list[at].as_ref() } else { None }
+    }
+}
+
+/// Number of faces with facets, and before such.
+fn faces(solid: &Solid) -> u32 {
+    match solid {
+        Solid::Shape(Shape::Sphere | Shape::HalfSpace | Shape::Disc) => 1,
+        Solid::Shape(Shape::Cuboid) => 6,
+        Solid::Shape(Shape::Cylinder | Shape::Cone { .. }) | Solid::Round { .. } | Solid::Taper { .. } => 3,
+        Solid::Trough { .. } => 5,
+        Solid::Polyhedron(polyhedron) => polyhedron.planes().len() as u32,
+        Solid::Torus { .. } | Solid::Mesh(_) => 0,
+    }
+}
+
+/// Hits of consecutive rays on shapes and solids.
+#[derive(Clone, Copy, Debug)]
+pub struct Met<V> {
+    /// Lanes that hit something; of [`World::met_facets`] those whose numbers are here.
+    pub hit: u32,
+    /// Hit points, world space.
+    pub position: Lanes3<V>,
+    /// Unit normals: of a shape outward, of a tree of solids out of the whole.
+    pub normal: Lanes3<V>,
+    /// See [`super::Surface::magnitude`]; only of [`World::met_facets`].
+    pub magnitude: Lanes3<V>,
+    /// Part of each hit, see [`World::part`].
+    pub part: [u32; MAX_LANES],
+    /// Material of each hit.
+    pub material: [u32; MAX_LANES],
+}
+
+impl<S: Real> World<S> {
+    /// Whether [`Self::met_facets`] can find any.
+    pub fn has_facets(&self) -> bool {
+        self.facets.iter().any(|facets| !facets.list.is_empty())
+    }
+
+    /// Positions and geometric normals of hits `first..first + N` of `rays` on shapes and solids, as [`Self::surface`]
+    /// gives them up to rounding in `S`, but for degenerate ones, whose normals are not unit.
+    #[inline]
+    pub fn met(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize) -> Met<S::Wide> {
+        self.look_up::<true>(rays, hits, first)
+    }
+
+    /// The same of those hits on shapes and solids of instances that stay where their objects are whose normals are
+    /// affine functions of the point, and not degenerate.
+    #[inline]
+    pub fn met_facets(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize) -> Met<S::Wide> {
+        let mut met = self.look_up::<false>(rays, hits, first);
+        let square = dot(met.normal, met.normal);
+        met.hit &= square.cmp_lt(S::Wide::constant(1.5)).bits();
+        met
+    }
+
+    /// `ALL`: of all hits, else those with facets.
+    #[inline(always)]
+    fn look_up<const ALL: bool>(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize) -> Met<S::Wide> {
+        let n = S::Wide::N;
+        let zero = [S::Wide::constant(0.0); 3];
+        let none = [INVALID_ID; MAX_LANES];
+        let mut met = Met { hit: 0, position: zero, normal: zero, magnitude: zero, part: none, material: none };
+        for lane in 0..n {
+            met.hit |= u32::from(hits.prim[first + lane] != INVALID_ID) << lane;
+        }
+        if met.hit == 0 {
+            return met;
+        }
+        let lead = first + met.hit.trailing_zeros() as usize;
+        let key = |i: usize| (hits.prim[i], hits.inst[i], hits.u[i]);
+        let is_same = (0..n).all(|lane| met.hit >> lane & 1 == 0 || key(first + lane) == key(lead));
+        let (run, facet) = self.facet(hits, lead);
+        let fields: [S::Wide; FIELDS] = match facet {
+            Some(facet) if is_same => {
+                (met.part, met.material) = ([run.part; MAX_LANES], [run.material; MAX_LANES]);
+                facet.fields.map(S::Wide::splat)
+            }
+            None if is_same && !ALL => {
+                met.hit = 0;
+                return met;
+            }
+            _ => self.gather::<ALL>(rays, hits, first, &mut met),
+        };
+        let vector = |from: &[Vec<S>; 3]| [&from[0], &from[1], &from[2]].map(|a| S::Wide::load(&a[first..]));
+        let (org, dir, t) = (vector(&rays.org), vector(&rays.dir), S::Wide::load(&hits.t[first..]));
+        met.position = [0, 1, 2].map(|axis| dir[axis].mul_add(t, org[axis]));
+        let row = |k: usize| [fields[3 * k], fields[3 * k + 1], fields[3 * k + 2]];
+        let [x, y, z, centre, constant, magnitude] = [row(0), row(1), row(2), row(3), row(4), row(5)];
+        let from = space::sub(met.position, centre);
+        let outward = space::add(map3([x, y, z], |row| dot(row, from)), constant);
+        let turned = S::Wide::constant(0.5).cmp_lt(S::Wide::load(&hits.v[first..]));
+        let length = dot(outward, outward).sqrt();
+        let scale = S::Wide::constant(1.0) / S::Wide::select(turned, -length, length);
+        met.normal = space::scale(outward, scale);
+        met.magnitude = magnitude;
+        met
+    }
+
+    /// Fields of each hit's facet. Of hits without a facet the normal alone if `ALL`, else they are taken out.
+    #[inline(never)]
+    fn gather<const ALL: bool>(
+        &self,
+        rays: &Rays<S>,
+        hits: &Hits<S>,
+        first: usize,
+        met: &mut Met<S::Wide>,
+    ) -> [S::Wide; FIELDS] {
+        let mut columns = [[S::ZERO; MAX_LANES]; FIELDS];
+        let mut left = met.hit;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let (run, facet) = self.facet(hits, first + lane);
+            (met.part[lane], met.material[lane]) = (run.part, run.material);
+            let own;
+            let facet = match facet {
+                Some(facet) => facet,
+                None if ALL => {
+                    own = self.plain(rays, hits, first + lane);
+                    &own
+                }
+                None => {
+                    met.hit &= !(1 << lane);
+                    continue;
+                }
+            };
+            columns.iter_mut().zip(&facet.fields).for_each(|(column, &x)| column[lane] = x);
+        }
+        columns.map(|column| S::Wide::load(&column))
+    }
+
+    /// Run and facet of hit `i`.
+    #[inline(always)]
+    fn facet(&self, hits: &Hits<S>, i: usize) -> (Run, Option<&Facet<S>>) {
+        let (prim, inst) = (hits.prim[i], hits.inst[i]);
+        let instance = &self.instances[inst as usize];
+        let (at, run) = self.runs[instance.object as usize].find(prim);
+        let kept = self.facets[instance.object as usize].get(at, hits.u[i].to_f64() as usize);
+        (run, kept.filter(|_| instance.identity))
+    }
+
+    /// The plane through hit `i`, before its normal is turned.
+    #[cold]
+    fn plain(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize) -> Facet<S> {
+        let (org, dir) = (DVec3::from(rays.org(i).map(S::to_f64)), DVec3::from(rays.dir(i).map(S::to_f64)));
+        let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
+        let normal = self.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]).ng;
+        Facet::flat(if v > 0.5 { -normal } else { normal })
+    }
+}

@@ -1,0 +1,92 @@
+//! Triangles that enclose a solid, in databases of both versions, against the box that they are.
+
+use std::path::Path;
+
+use lanecast::ray::{Hits, Rays};
+use lanecast::scene::brlcad::describe::{Options, describe};
+use lanecast::scene::brlcad::parse;
+use lanecast::scene::world::{Preset, World};
+use lanecast::trace::{Scratch, engine};
+
+/// The box from (0, 0, 0) to (2, 3, 4): corners and faces of triangles, some of them turned.
+const CORNERS: [[u32; 3]; 8] = [[0, 0, 0], [2, 0, 0], [2, 3, 0], [0, 3, 0], [0, 0, 4], [2, 0, 4], [2, 3, 4], [0, 3, 4]];
+const FACES: [[usize; 4]; 6] = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [7, 6, 2, 3], [3, 0, 4, 7]];
+
+fn world(text: &str) -> World<f64> {
+    let database = parse(Path::new("d.asc"), text.as_bytes()).unwrap();
+    let description = describe(Path::new("d.asc"), "d", &database, &Options::default()).unwrap();
+    World::compile(&description, Preset::Balanced).unwrap()
+}
+
+/// Version 5: `body` less a ball in it.
+fn with_ball(body: &str) -> World<f64> {
+    let ball = "put ball ell V {2 2 2} A {1.5 0 0} B {0 1.5 0} C {0 0 1.5}";
+    let cut = "put r comb region yes tree {- {l body} {l ball}}";
+    world(&format!("title {{t}}\nunits mm\n{body}\n{ball}\n{cut}\n"))
+}
+
+fn list<T: std::fmt::Display>(items: impl Iterator<Item = [T; 3]>) -> String {
+    items.map(|[a, b, c]| format!("{{{a} {b} {c}}} ")).collect()
+}
+
+fn hits(world: &World<f64>) -> Hits<f64> {
+    let mut rays = Rays::new(40 * 40);
+    for i in 0..rays.len() {
+        let (x, y) = ((i % 40) as f64 * 0.077 - 0.5, (i / 40) as f64 * 0.103 - 0.5);
+        rays.set(i, [x, y, 9.0], [0.011, -0.017, -1.0], 0.0, f64::INFINITY);
+    }
+    let mut hits = Hits::new(0);
+    engine::<f64>("auto").unwrap().intersect(world, &rays, &mut hits, &mut Scratch::default(), None);
+    hits
+}
+
+/// That both worlds are the same to rays: hit or miss, and where to a few roundings.
+fn same(a: &World<f64>, b: &World<f64>) {
+    let (a, b) = (hits(a), hits(b));
+    assert!(a.hit_count() > 500 && a.hit_count() < a.len() - 100);
+    for i in 0..a.len() {
+        assert_eq!(a.is_hit(i), b.is_hit(i), "ray {i}");
+        assert!(!a.is_hit(i) || (a.t[i] - b.t[i]).abs() < 1e-12, "ray {i}: {} and {}", a.t[i], b.t[i]);
+    }
+}
+
+#[test]
+fn a_solid_bot_is_the_box_of_its_corners() {
+    let corners = CORNERS.iter().zip(1..).map(|([x, y, z], i)| format!("V{i} {{{x} {y} {z}}} "));
+    let arb = with_ball(&format!("put body arb8 {}", corners.collect::<String>()));
+    let triangles = FACES
+        .iter()
+        .enumerate()
+        .flat_map(|(i, &[a, b, c, d])| [[a, b, c], if i % 2 == 0 { [a, c, d] } else { [d, c, a] }]);
+    let (vertices, faces) = (list(CORNERS.into_iter()), list(triangles));
+    let bot = format!("put body bot mode volume orient no flags {{}} V {{ {vertices}}} F {{ {faces}}}");
+    same(&arb, &with_ball(&bot));
+}
+
+#[test]
+fn a_polysolid_is_one_too() {
+    let polygons = FACES.iter().map(|face| {
+        // Five places for corners, and normals that are not read.
+        let places = face.map(|k| CORNERS[k].map(|x| x.to_string()).join(" ")).join(" ");
+        format!("Q 4 {places} 0 0 0{}\n", " 0 0 1".repeat(5))
+    });
+    let polygons: String = polygons.collect();
+    let region = "C Y r 1 0 1 0 0 0 0 0 0 0 0\nM u body 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1 0\n";
+    let old = world(&format!("I 1 v4\nt\nP body\n{polygons}{region}"));
+    let new = "put body arb8 V1 {0 0 0} V2 {2 0 0} V3 {2 3 0} V4 {0 3 0} V5 {0 0 4} V6 {2 0 4} V7 {2 3 4} V8 {0 3 4}";
+    same(&world(&format!("title {{t}}\nunits mm\n{new}\nput r comb region yes tree {{l body}}\n")), &old);
+}
+
+#[test]
+fn surfaces_and_open_bots_are_named() {
+    let problem = |mode: &str, faces: &str| {
+        let text = format!(
+            "title {{t}}\nunits mm\nput body bot mode {mode} orient no V {{{{0 0 0}} {{1 0 0}} {{0 1 0}} {{0 0 1}}}} F {{{faces}}}\n\
+             put r comb region yes tree {{l body}}\n"
+        );
+        let database = parse(Path::new("d.asc"), text.as_bytes()).unwrap();
+        describe(Path::new("d.asc"), "d", &database, &Options::default()).unwrap_err().to_string()
+    };
+    let surface = problem("surf", "{0 1 2} {0 1 3} {0 2 3} {1 2 3}");
+    assert!(surface.contains("surface") && surface.contains("body"), "{surface}");
+}
