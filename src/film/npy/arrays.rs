@@ -242,6 +242,19 @@ pub fn write_stretches(path: &Path, stretches: &[Stretch]) -> Result<u64> {
     })
 }
 
+/// Writes flags of voxels as `|u1` of shape (nz, ny, nx): x runs fastest. `size` is nx, ny, nz; as many flags.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_voxels(path: &Path, size: [usize; 3], flags: &[u8]) -> Result<u64> {
+    let [nx, ny, _] = size;
+    let row = [ny as u64, nx as u64];
+    write_array(path, &Descr::Plain("|u1".to_owned()), &row, flags.chunks(nx * ny), |plane: &&[u8], bytes| {
+        bytes.extend_from_slice(plane);
+        1
+    })
+}
+
 /// Streams batches into an array of shape (N, `row`..). `encode` appends a batch's bytes and says how many rows they
 /// are. N is known only at the end; the header has room for it, see [`header::bytes`].
 fn write_array<B>(

@@ -1,0 +1,288 @@
+//! Solids as meshes: closed and manifold whatever the solid, as near to it as was asked for, sharp where it is sharp.
+
+mod common;
+mod solid_support;
+
+use std::collections::{HashMap, HashSet};
+use std::f64::consts::PI;
+
+use common::Random;
+use glam::{DAffine3, DQuat, DVec3};
+use lanecast::convert::{Fineness, Solids, Surface, surface, voxels};
+use lanecast::reference::Oracle;
+use lanecast::scene::description::{Description, ItemKind, Shape};
+use lanecast::scene::load::{LoadOptions, load};
+use lanecast::scene::mesh::Mesh;
+use lanecast::scene::solids::{self, NodeKind, Placed, SolidNode, SolidTree};
+use solid_support::{KINDS, cuboid, grow, scene};
+
+const MEMORY: u64 = 1 << 30;
+
+fn converted(description: &Description, tolerance: f64, cells: Option<u32>) -> Surface {
+    let solids = Solids::new(description, &[]).unwrap();
+    surface(&solids, &Fineness { tolerance, cells, memory: MEMORY }, &|| false).unwrap()
+}
+
+/// Checks that every edge is in two triangles, once each way, that the triangles around each vertex are one fan, and
+/// that no two vertices are at one place. Gives the Euler characteristic.
+fn manifold(mesh: &Mesh, what: &str) -> i64 {
+    let mut after: HashMap<(u32, u32), u32> = HashMap::new();
+    let mut used: HashSet<u32> = HashSet::new();
+    for &[a, b, c] in &mesh.triangles {
+        assert!(a != b && b != c && c != a, "{what}: a triangle has a corner twice");
+        for (a, b, c) in [(a, b, c), (b, c, a), (c, a, b)] {
+            assert_eq!(after.insert((a, b), c), None, "{what}: edge {a} {b} twice the same way");
+            used.insert(a);
+        }
+    }
+    for (a, b) in after.keys() {
+        assert!(after.contains_key(&(*b, *a)), "{what}: edge {a} {b} has one side");
+    }
+    let places: HashSet<[u64; 3]> = mesh.positions.iter().map(|p| p.to_array().map(f64::to_bits)).collect();
+    assert_eq!(places.len(), mesh.positions.len(), "{what}: two vertices at one place");
+    assert_eq!(used.len(), mesh.positions.len(), "{what}: a vertex without triangles");
+    one_fan_each(mesh, &after, what);
+    mesh.positions.len() as i64 - after.len() as i64 / 2 + mesh.triangles.len() as i64
+}
+
+/// Goes round each vertex from one of its triangles; all of them must be met.
+fn one_fan_each(mesh: &Mesh, after: &HashMap<(u32, u32), u32>, what: &str) {
+    let mut around = vec![(0, 0); mesh.positions.len()];
+    for &[a, b, c] in &mesh.triangles {
+        for (v, next) in [(a, b), (b, c), (c, a)] {
+            around[v as usize] = (around[v as usize].0 + 1, next);
+        }
+    }
+    for (v, &(size, first)) in (0..).zip(&around) {
+        let (mut at, mut steps) = (first, 0);
+        while steps < size {
+            at = after[&(v, at)];
+            steps += 1;
+            if at == first {
+                break;
+            }
+        }
+        assert_eq!((at, steps), (first, size), "{what}: vertex {v} joins two sheets");
+    }
+}
+
+/// Least distance from the solid's surface along some lines through a point, by the oracle.
+fn distance(oracle: &Oracle, point: DVec3, reach: f64) -> f64 {
+    let ways = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE, DVec3::new(1.0, -1.0, 1.0), DVec3::new(-1.0, 1.0, 1.0)];
+    let mut least = reach;
+    for way in ways.into_iter().map(DVec3::normalize).chain([DVec3::new(1.0, 1.0, -1.0).normalize()]) {
+        for dir in [way, -way] {
+            let mut from = 0.0;
+            // Every boundary on the way, one after the other.
+            while let Some(hit) = oracle.closest(point - dir * reach, dir, from, 2.0 * reach) {
+                least = least.min((hit.t - reach).abs());
+                from = hit.t + 1e-3 * reach;
+            }
+        }
+    }
+    least
+}
+
+fn one(placed: Placed) -> Description {
+    let mut tree = SolidTree::new("one");
+    tree.solid(placed);
+    scene(tree)
+}
+
+fn turned(placed: Placed) -> Placed {
+    let turn = DAffine3::from_rotation_translation(
+        DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.6),
+        DVec3::new(0.3, -0.2, 0.1),
+    );
+    Placed { transform: turn * placed.transform, ..placed }
+}
+
+/// Shapes with their volumes, areas and Euler characteristics.
+#[test]
+fn closed_forms() {
+    let (z, tolerance) = (DVec3::Z, 0.004);
+    let cube = cuboid(DVec3::splat(-1.0), DVec3::ONE);
+    let cone = 2f64.sqrt() * PI + PI;
+    for (what, placed, volume, area, euler) in [
+        ("ball", solids::ball(DVec3::ZERO, 1.0), 4.0 / 3.0 * PI, 4.0 * PI, 2),
+        ("cube", Ok(cube.clone()), 8.0, 24.0, 2),
+        ("turned cube", Ok(turned(cube)), 8.0, 24.0, 2),
+        ("cylinder", solids::cylinder(-z, z, 0.8).map(turned), 1.28 * PI, 4.48 * PI, 2),
+        ("cone", solids::cone(DVec3::ZERO, z, 1.0, 0.0).map(turned), PI / 3.0, cone, 2),
+        ("torus", solids::torus(DVec3::ZERO, z, 1.0, 0.3).map(turned), 0.18 * PI * PI, 1.2 * PI * PI, 0),
+    ] {
+        let description = one(placed.unwrap());
+        let found = converted(&description, tolerance, None);
+        assert_eq!(manifold(&found.mesh, what), euler, "{what}");
+        let off = (found.mesh.volume() - volume).abs();
+        assert!(off <= tolerance * area, "{what}: volume is off by {off}");
+        assert!(found.at_vertices.max(found.at_middles) <= tolerance, "{what}: {found:?}");
+        let oracle = Oracle::new(&Solids::new(&description, &[]).unwrap().world.assembly);
+        for p in &found.mesh.positions {
+            let away = distance(&oracle, *p, 0.1);
+            assert!(away <= tolerance, "{what}: {p} is {away} away");
+        }
+    }
+}
+
+#[test]
+fn a_cube_keeps_its_corners_and_edges() {
+    for placed in [cuboid(DVec3::ZERO, DVec3::ONE), turned(cuboid(DVec3::ZERO, DVec3::ONE))] {
+        let to_local = placed.transform.inverse();
+        let mesh = converted(&one(placed), 0.1, Some(20)).mesh;
+        // The canonical box is [-1, 1]^3.
+        let local: Vec<DVec3> = mesh.positions.iter().map(|p| to_local.transform_point3(*p)).collect();
+        for corner in 0..8 {
+            let corner =
+                DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2)) * 2.0 - 1.0;
+            let least = local.iter().map(|p| p.distance(corner)).fold(f64::INFINITY, f64::min);
+            assert!(least < 1e-6, "{corner}: {least}");
+        }
+        for p in &local {
+            let out = p.abs().max_element() - 1.0;
+            assert!(out.abs() < 1e-6, "{p} is not on the cube");
+        }
+        assert!((mesh.volume() - 1.0).abs() < 1e-6, "edges are cut: volume {}", mesh.volume());
+    }
+}
+
+/// Random trees, cut to a box so that complements have bounds: coarse grids, where all kinds of cells occur.
+#[test]
+fn random_trees_give_manifolds() {
+    for seed in 0..40u64 {
+        let mut r = Random(seed);
+        let mut tree = SolidTree::new("random");
+        let grown = grow(&mut tree, &mut r, 1 + (seed % 5) as usize, KINDS);
+        let bound = tree.solid(cuboid(DVec3::splat(-3.1), DVec3::splat(2.9)));
+        tree.op(NodeKind::Intersection(vec![grown, bound]));
+        let description = scene(tree);
+        for cells in [9, 24] {
+            let found = converted(&description, 0.1, Some(cells));
+            manifold(&found.mesh, &format!("seed {seed}, {cells} cells"));
+            let oracle = Oracle::new(&Solids::new(&description, &[]).unwrap().world.assembly);
+            let reach = 2.0 * found.grid.spacing;
+            for p in found.mesh.positions.iter().step_by(17) {
+                let away = distance(&oracle, *p, reach);
+                assert!(away <= found.at_vertices + 1e-3 * reach, "seed {seed}: {p} is {away} away");
+            }
+        }
+    }
+}
+
+/// Every second cube of a lattice: corners and edges where four faces meet, which no manifold has at one place.
+#[test]
+fn cubes_that_touch_at_edges() {
+    let mut tree = SolidTree::new("checkered");
+    let cells = (0..27).map(|i| [i % 3, i / 3 % 3, i / 9]).filter(|c| c.iter().sum::<i32>() % 2 == 0);
+    let cubes: Vec<_> =
+        cells.map(|c| DVec3::from_array(c.map(f64::from))).map(|lo| tree.solid(cuboid(lo, lo + 1.0))).collect();
+    tree.op(NodeKind::Union(cubes));
+    let description = scene(tree);
+    for cells in [7, 10, 30] {
+        manifold(&converted(&description, 0.1, Some(cells)).mesh, &format!("{cells} cells"));
+    }
+}
+
+/// Overlapping and touching solids of a scene are one solid; shapes that stand alone count too.
+#[test]
+fn a_scene_is_one_solid() {
+    let mut description = one(cuboid(DVec3::ZERO, DVec3::ONE));
+    let mut add = |shape, at: DVec3, half: f64| {
+        let transform = DAffine3::from_scale_rotation_translation(DVec3::splat(half), DQuat::IDENTITY, at);
+        description.groups[0].items.push(common::item(ItemKind::Shape(shape), transform));
+    };
+    add(Shape::Cuboid, DVec3::new(1.5, 0.5, 0.5), 0.5);
+    add(Shape::Cuboid, DVec3::new(0.75, 0.5, 0.5), 0.25);
+    add(Shape::Sphere, DVec3::new(5.0, 0.5, 0.5), 0.5);
+    add(Shape::Disc, DVec3::new(9.0, 0.0, 0.0), 1.0);
+    let solids = Solids::new(&description, &[]).unwrap();
+    assert!(solids.left_out == 1 && (solids.hi.x - 5.5).abs() < 1e-6);
+    let found = surface(&solids, &Fineness { tolerance: 0.01, cells: Some(60), memory: MEMORY }, &|| false).unwrap();
+    assert_eq!(manifold(&found.mesh, "scene"), 4);
+    let want = 2.0 + PI / 6.0;
+    assert!((found.mesh.volume() - want).abs() < 0.01, "{} {want}", found.mesh.volume());
+}
+
+/// The built-in scenes' solids: closed, and rays meet the mesh where they meet the solid.
+#[test]
+fn rays_see_the_same_solid() {
+    for (name, solid) in
+        [("bolt", "plate"), ("bolt", "washer"), ("die", "first"), ("rook", "white rook"), ("bolt", "bolt")]
+    {
+        let description = load(&format!("builtin:{name}"), &LoadOptions::default()).unwrap();
+        let solids = Solids::new(&description, &[solid.into()]).unwrap();
+        let fineness = Fineness { tolerance: 1.0, cells: Some(64), memory: MEMORY };
+        let found = surface(&solids, &fineness, &|| false).unwrap();
+        manifold(&found.mesh, solid);
+        let (middle, size) = (0.5 * (solids.lo + solids.hi), (solids.hi - solids.lo).length());
+        let near = 0.002 * size;
+        let meshed = {
+            let mut d = Description::new("mesh");
+            d.meshes.push(found.mesh.into());
+            d.groups[0].items.push(common::item(ItemKind::Mesh(0), DAffine3::IDENTITY));
+            lanecast::scene::assembly::Assembly::new(&d).unwrap()
+        };
+        let (truth, mesh) =
+            (Oracle::new(&solids.world.assembly), Oracle::with_search(&meshed, lanecast::reference::Search::Tree));
+        let mut r = Random(7);
+        let (mut hits, mut far) = (0, 0);
+        for _ in 0..3000 {
+            let org = middle + r.direction() * size;
+            let dir = (middle + r.in_cube() * 0.3 * size - org).normalize();
+            let (a, b) = (truth.closest(org, dir, 0.0, 1e9), mesh.closest(org, dir, 0.0, 1e9));
+            match (a, b) {
+                (None, None) => continue,
+                (Some(a), Some(b)) => {
+                    hits += 1;
+                    // A distance along the ray counts as it is seen from the surface.
+                    let facing = a.ng.normalize().dot(dir).abs();
+                    far += usize::from((a.t - b.t).abs() * facing > near);
+                }
+                _ => far += 1,
+            }
+        }
+        println!("{name} {solid}: {far} of {hits} differ");
+        // Rays past a silhouette or an edge see something else behind it.
+        assert!(hits > 300 && far * 50 < hits, "{name} {solid}: {far} of {hits} differ");
+    }
+}
+
+#[test]
+fn voxels_of_a_ball_and_a_box() {
+    let solids = Solids::new(&one(solids::ball(DVec3::new(1.0, 2.0, 3.0), 1.0).unwrap()), &[]).unwrap();
+    let fineness = Fineness { tolerance: 0.1, cells: None, memory: MEMORY };
+    let found = voxels(&solids, 0.07, &fineness).unwrap();
+    let [nx, ny, nz] = found.size;
+    for (i, flag) in found.inside.iter().enumerate() {
+        let at = DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / nx / ny) as f64);
+        let away = (found.origin + at * found.spacing - DVec3::new(1.0, 2.0, 3.0)).length() - 1.0;
+        assert!((*flag == 1) == (away < 0.0) || away.abs() < 1e-9, "{at}: {away}");
+    }
+    assert_eq!(found.inside.len(), nx * ny * nz);
+    let solids = Solids::new(&one(cuboid(DVec3::ZERO, DVec3::new(4.0, 3.0, 2.0))), &[]).unwrap();
+    let found = voxels(&solids, 0.5, &fineness).unwrap();
+    assert_eq!((found.size, found.inside.iter().map(|f| usize::from(*f)).sum::<usize>()), ([8, 6, 4], 8 * 6 * 4));
+}
+
+#[test]
+fn what_cannot_be_converted_is_refused() {
+    let refused =
+        |description: &Description, names: &[String]| Solids::new(description, names).unwrap_err().to_string();
+    let half = one(solids::half_space(DVec3::Z, 0.0).unwrap());
+    assert!(refused(&half, &[]).contains("has no bounds"));
+    let mut tree = SolidTree::new("outside");
+    let ball = tree.solid(solids::ball(DVec3::ZERO, 1.0).unwrap());
+    tree.add(SolidNode { transform: DAffine3::IDENTITY, material: None, kind: NodeKind::Complement(ball) });
+    assert!(refused(&scene(tree), &[]).contains("has no bounds"));
+    let mut empty = Description::new("empty");
+    assert!(refused(&empty, &[]).contains("nothing in the scene is a solid"));
+    empty.groups[0].items.push(common::item(ItemKind::Shape(Shape::Disc), DAffine3::IDENTITY));
+    assert!(refused(&empty, &[]).contains("nothing in the scene is a solid"));
+    assert!(refused(&half, &["bal".into()]).contains("no solid is called `bal`"));
+
+    let solids = Solids::new(&one(solids::ball(DVec3::ZERO, 1.0).unwrap()), &[]).unwrap();
+    let fine = |memory, cells| surface(&solids, &Fineness { tolerance: 1e-6, cells, memory }, &|| false);
+    assert!(fine(MEMORY, Some(5000)).unwrap_err().to_string().contains("MiB"));
+    assert!(fine(1 << 24, None).unwrap_err().to_string().contains("--tolerance"));
+    assert!(surface(&solids, &Fineness { tolerance: 0.1, cells: None, memory: MEMORY }, &|| true).is_err());
+}
