@@ -7,13 +7,8 @@
 //! | floor | modules | what lives there |
 //! |---|---|---|
 //! | 8 | [`cli`] | arguments, commands, progress, exit codes |
-<<<<<<< HEAD
 //! | 7 | [`measure`], [`view`] | ray sets, timing, statistics, verification, reports; terminal, viewers, windows |
-//! | 6 | [`render`], [`mod@reference`] | the tile scheduler, progressive blocks; the f64 oracle (floors 0, 3 and 5 only) |
-=======
-//! | 7 | [`measure`] | ray sets, timing, statistics, verification, reports |
-//! | 6 | [`render`], [`convert`], [`mod@reference`] | tile scheduler; solids as meshes; the f64 oracle (floors 0, 3, 5) |
->>>>>>> parent of 7e908ee (Revert "Merge branch 'convert'": it does not keep a cube's corners yet)
+//! | 6 | [`render`], [`convert`], [`mod@reference`] | tile scheduler, blocks; solids as meshes; the f64 oracle (floors 0, 3, 5) |
 //! | 5 | [`film`], [`shade`] | framebuffer and image files; materials, lights, integrators |
 //! | 4 | [`trace`] | the engines behind one trait |
 //! | 3 | [`scene`], [`camera`] | description, importers, world; cameras, tiles, ray generation |

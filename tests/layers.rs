@@ -13,13 +13,8 @@ const FLOORS: [&[&str]; 9] = [
     &["scene", "camera"],
     &["trace"],
     &["film", "shade"],
-<<<<<<< HEAD
-    &["render", "reference"],
-    &["measure", "view"],
-=======
     &["render", "convert", "reference"],
-    &["measure"],
->>>>>>> parent of 7e908ee (Revert "Merge branch 'convert'": it does not keep a cube's corners yet)
+    &["measure", "view"],
     &["cli"],
 ];
 

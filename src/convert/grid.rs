@@ -26,7 +26,14 @@ impl Grid {
     /// More than 65 536 cells along an axis.
     pub fn around(lo: DVec3, hi: DVec3, spacing: f64, shift: DVec3) -> Result<Self> {
         let origin = lo - spacing * (DVec3::splat(1.0) + shift);
-        let counts = ((hi - origin) / spacing).ceil() + 1.0;
+        Self::new(origin, spacing, ((hi - origin) / spacing).ceil() + 1.0)
+    }
+
+    /// A grid of `counts` cells.
+    ///
+    /// # Errors
+    /// More than 65 536 cells along an axis.
+    pub fn new(origin: DVec3, spacing: f64, counts: DVec3) -> Result<Self> {
         if !counts.is_finite() || counts.max_element() > MAX_CELLS {
             let most = counts.max_element();
             return Err(Error::Usage(format!(
@@ -59,6 +66,13 @@ impl Grid {
         [number % nx, number / nx % ny, number / nx / ny].map(|n| n as usize)
     }
 
+    /// The cell with a point in it, by its lower corner.
+    pub fn cell_at(&self, point: DVec3) -> Option<[usize; 3]> {
+        let at = ((point - self.origin) / self.spacing).floor().to_array();
+        let is_cell = at.iter().zip(self.cells).all(|(&n, count)| n >= 0.0 && n < count as f64);
+        is_cell.then(|| at.map(|n| n as usize))
+    }
+
     /// Where corner `at` is.
     pub fn position(&self, at: [usize; 3]) -> DVec3 {
         self.origin + self.spacing * DVec3::from_array(at.map(|n| n as f64))
@@ -77,6 +91,8 @@ mod tests {
         assert_eq!(grid.corner([3, 2, 1]), 3 + 8 * (2 + 6));
         assert_eq!(grid.corner_at(grid.corner([7, 5, 4])), [7, 5, 4]);
         assert_eq!(grid.position([1, 0, 2]), DVec3::new(-0.25, -0.75, 0.25));
+        assert_eq!(grid.cell_at(DVec3::new(-0.2, -0.7, 0.3)), Some([1, 0, 2]));
+        assert_eq!(grid.cell_at(DVec3::new(-0.8, 0.0, 0.0)), None);
         assert!(Grid::around(DVec3::ZERO, DVec3::ONE, 1e-9, DVec3::ZERO).is_err());
     }
 }

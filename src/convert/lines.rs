@@ -1,7 +1,6 @@
 //! Lines through the solids of a scene: where they are inside of any of them, with the surface at both ends.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::lanes::Real;
 use crate::ray::{INVALID_ID, Rays};
@@ -24,6 +23,18 @@ pub struct Line {
     pub length: f64,
 }
 
+impl Line {
+    /// The line through `point` along the unit vector `dir`, `reach` to both sides.
+    pub fn through(point: DVec3, dir: DVec3, reach: f64) -> Self {
+        Self { org: point - dir * reach, dir, length: 2.0 * reach }
+    }
+
+    /// The point at distance `t`.
+    pub fn at(&self, t: f64) -> DVec3 {
+        self.org + self.dir * t
+    }
+}
+
 /// Where a line passes through the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
@@ -35,32 +46,48 @@ pub struct Crossing {
     pub enters: bool,
 }
 
-/// The crossings of each line in order, inside and outside in turns. A line that starts inside has its first crossing
-/// leave.
-pub fn crossings(world: &World<f64>, lines: &[Line]) -> Vec<Vec<Crossing>> {
-    let batches: Vec<Vec<Vec<Crossing>>> =
-        lines.par_chunks(BATCH).map_init(Scratch::default, |scratch, lines| batch(world, lines, scratch)).collect();
-    batches.into_iter().flatten().collect()
+/// Traces lines on one thread.
+#[derive(Default)]
+pub struct Tracer {
+    scratch: Scratch,
 }
 
-fn batch(world: &World<f64>, lines: &[Line], scratch: &mut Scratch) -> Vec<Vec<Crossing>> {
-    let mut rays = Rays::<f64>::new(lines.len());
-    for (i, line) in lines.iter().enumerate() {
-        rays.set(i, line.org.to_array(), line.dir.to_array(), 0.0, line.length);
+impl Tracer {
+    /// Calls `found` for every line, in order, with its number and its crossings in order, inside and outside in turns.
+    /// A line that starts inside has its first crossing leave.
+    pub fn each(&mut self, world: &World<f64>, lines: &[Line], mut found: impl FnMut(usize, &[Crossing])) {
+        let mut list = Vec::new();
+        for (number, lines) in lines.chunks(BATCH).enumerate() {
+            let mut rays = Rays::<f64>::new(lines.len());
+            for (i, line) in lines.iter().enumerate() {
+                rays.set(i, line.org.to_array(), line.dir.to_array(), 0.0, line.length);
+            }
+            let stretches = stretches::<<f64 as Real>::Octo>(world, &rays, &mut self.scratch);
+            let mut rest = &stretches[..];
+            for (i, line) in lines.iter().enumerate() {
+                let (of_line, after) = rest.split_at(rest.partition_point(|s| s.ray as usize <= i));
+                joined(world, line, of_line, &mut list);
+                found(number * BATCH + i, &list);
+                rest = after;
+            }
+        }
     }
-    let found = stretches::<<f64 as Real>::Octo>(world, &rays, scratch);
-    let mut lists = vec![Vec::new(); lines.len()];
-    for of_line in found.chunk_by(|a, b| a.ray == b.ray) {
-        let ray = of_line[0].ray as usize;
-        lists[ray] = joined(world, &lines[ray], of_line);
+
+    /// For every line the crossing nearest to its middle.
+    pub fn nearest(&mut self, world: &World<f64>, lines: &[Line]) -> Vec<Option<Crossing>> {
+        let mut list = Vec::with_capacity(lines.len());
+        self.each(world, lines, |i, found| {
+            let away = |c: &&Crossing| (c.t - 0.5 * lines[i].length).abs();
+            list.push(found.iter().min_by(|a, b| away(a).total_cmp(&away(b))).copied());
+        });
+        list
     }
-    lists
 }
 
 /// The union of a line's stretches, which are in order of their beginnings.
-fn joined(world: &World<f64>, line: &Line, list: &[Stretch]) -> Vec<Crossing> {
+fn joined(world: &World<f64>, line: &Line, list: &[Stretch], found: &mut Vec<Crossing>) {
     let same = SAME * (line.org.abs().max_element() + line.length);
-    let mut found = Vec::with_capacity(2 * list.len());
+    found.clear();
     let mut rest = list;
     while let Some((first, after)) = rest.split_first() {
         let mut last = first;
@@ -80,18 +107,5 @@ fn joined(world: &World<f64>, line: &Line, list: &[Stretch]) -> Vec<Crossing> {
         push(first.t_in, first.uv_in, first.prim_in, first.inst, true);
         push(last.t_out, last.uv_out, last.prim_out, last.inst, false);
         rest = &after[end..];
-    }
-    found
-}
-
-/// Sets `row[i]` to 1 where the point at `(i + 1) spacing` is inside, if `found` are a line's crossings.
-pub fn fill(found: &[Crossing], spacing: f64, row: &mut [u8]) {
-    let (mut next, mut inside) = (0, found.first().is_some_and(|c| !c.enters));
-    for (i, flag) in row.iter_mut().enumerate() {
-        while let Some(crossing) = found.get(next).filter(|c| c.t <= (i + 1) as f64 * spacing) {
-            inside = crossing.enters;
-            next += 1;
-        }
-        *flag = u8::from(inside);
     }
 }

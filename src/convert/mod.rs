@@ -2,47 +2,64 @@
 //!
 //! A uniform grid is laid around the solids; the rays along its lines say where they are inside, with the exact
 //! place and normal of every crossing ([`samples`]). The mesh is the grid's dual: a vertex in each cell the surface
-//! passes, at the point nearest to the tangent planes of the cell's crossings, so that edges and corners stay sharp
-//! (T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data", 2002; [`qef`]), several vertices
-//! where several pieces pass (G. M. Nielson, "Dual Marching Cubes", 2004; [`cell`]), woven to a manifold
-//! ([`weave`]). Departures from these: crossings are exact instead of bisected, faces that would make a mesh meet
-//! itself are joined the other way, and quadrilaterals are cut along the diagonal that is nearer to the true
-//! surface.
+//! passes, several where several pieces pass (G. M. Nielson, "Dual Marching Cubes", 2004; [`cell`]), woven to a
+//! manifold ([`weave`]; S. Schaefer, T. Ju, J. Warren, "Manifold Dual Contouring", 2007, have the same aim). A vertex
+//! is at the point nearest to the tangent planes of its piece's crossings, so that edges and corners stay sharp
+//! (T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data", 2002; [`qef`]); more rays bring it
+//! onto the surface itself (the idea of L. Kobbelt, M. Botsch, U. Schwanecke, H.-P. Seidel, "Feature Sensitive Surface
+//! Extraction from Volume Data", 2001; [`settle`]). Quadrilaterals are cut along the diagonal that is nearer to the
+//! true surface ([`triangles`]), distances are measured with rays ([`measure`]), and what leaves this module was
+//! checked to be closed and a manifold ([`mod@check`]).
 //!
-//! What is thinner than a cell and missed by all lines is lost, and triangles may pass through each other where the
+//! The first grid has cells of four times the tolerance, but no more than 64 along the longest side; cells are halved
+//! until the distances measured are within the tolerance. Memory goes with the surface, not with the volume. What
+//! is thinner than a cell and missed by all lines is lost, and triangles may pass through each other where the
 //! surface turns more than once within a cell. The mesh is closed and a manifold in any case.
 
+pub mod check;
 pub mod grid;
+pub mod measure;
 pub mod select;
+pub mod voxels;
+pub mod watch;
 
 mod cell;
 mod lines;
 mod qef;
+mod rows;
 mod samples;
+mod settle;
 mod snap;
 mod triangles;
+mod vertices;
 mod weave;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
+pub use check::Topology;
 pub use grid::Grid;
+pub use measure::Distances;
 pub use select::Solids;
+pub use voxels::Voxels;
+pub use watch::Watch;
 
 use crate::error::{Error, Result};
 use crate::scene::mesh::Mesh;
-use lines::Line;
+use rows::Rows;
 use samples::Samples;
+use weave::Net;
 
-/// Cells along the longest side of the first grid.
-const COARSEST: f64 = 32.0;
+/// Tolerances in a cell of the first grid.
+const CELL: f64 = 4.0;
+/// Cells along the longest side of the first grid: at least, at most.
+const FIRST: (f64, f64) = (16.0, 64.0);
+/// Cells of this share of the tolerance are the last: what is further away then is thinner than a cell.
+const LAST: f64 = 0.25;
 /// Where the grid's planes are between its cells' edges and the box of the solids: no simple fraction, so that flat
 /// faces do not lie in them.
 const SHIFT: DVec3 = DVec3::new(0.318_309_886, 0.367_879_441, 0.414_213_562);
-/// Shares of a voxel that are rounding.
-const ROUNDING: f64 = 1e-6;
-/// Bytes for a crossed edge: its meeting, up to four cells, vertices, triangles and the lines that measure them.
-const BYTES_PER_MEETING: u64 = 1200;
+/// Bytes for a crossed edge: its meeting, cells, vertices, quadrilateral, triangles and what checks them.
+const BYTES_PER_MEETING: u64 = 640;
 
 /// How fine.
 #[derive(Clone, Copy, Debug)]
@@ -62,98 +79,85 @@ pub struct Surface {
     pub mesh: Mesh,
     /// The grid it was made on.
     pub grid: Grid,
-    /// Largest distance of a vertex from the true surface, scene units.
-    pub at_vertices: f64,
-    /// Largest distance of the middle of a quadrilateral from the true surface.
-    pub at_middles: f64,
-    /// Parts that begin and end between two corners of the grid.
-    pub unresolved: u64,
+    /// Largest distances measured between the mesh and the true surface.
+    pub distances: Distances,
+    /// How it hangs together.
+    pub topology: Topology,
 }
 
-/// Flags of voxels.
-#[derive(Debug)]
-pub struct Voxels {
-    /// Middle of voxel (0, 0, 0).
-    pub origin: DVec3,
-    /// Edge of a voxel.
-    pub spacing: f64,
-    /// Number of voxels along x, y and z.
-    pub size: [usize; 3],
-    /// 1 where a voxel's middle is inside; x runs fastest, then y.
-    pub inside: Vec<u8>,
-}
-
-/// The surface of `solids`. `stop` is asked between grids.
+/// The surface of `solids`.
 ///
 /// # Errors
 /// A grid that needs more memory than allowed, cells below the digits of `f32`, [`Error::Interrupted`].
-pub fn surface(solids: &Solids, fineness: &Fineness, stop: &(dyn Fn() -> bool + Sync)) -> Result<Surface> {
+pub fn surface(solids: &Solids, fineness: &Fineness, watch: &Watch<'_>) -> Result<Surface> {
     let side = (solids.hi - solids.lo).max_element();
-    let mut count = fineness.cells.map_or(COARSEST, f64::from);
+    let first = (side / (CELL * fineness.tolerance)).clamp(FIRST.0, FIRST.1);
+    let mut count = fineness.cells.map_or(first, f64::from);
+    let mut before = None;
     loop {
-        if stop() {
-            return Err(Error::Interrupted);
-        }
         let grid = Grid::around(solids.lo, solids.hi, side / count, SHIFT)?;
-        let found = on_grid(solids, grid, fineness)?;
-        if fineness.cells.is_some() || found.at_vertices.max(found.at_middles) <= fineness.tolerance {
+        let found = on_grid(solids, grid, fineness, before, watch)?;
+        let is_last = fineness.cells.is_some() || grid.spacing <= LAST * fineness.tolerance;
+        if is_last || found.distances.largest() <= fineness.tolerance {
             return Ok(found);
         }
+        before = Some(found.distances.largest());
         count *= 2.0;
     }
 }
 
-fn on_grid(solids: &Solids, grid: Grid, fineness: &Fineness) -> Result<Surface> {
-    // Before sampling nothing is known but that a surface of about the box's own passes the grid.
-    let [x, y, z] = grid.cells.map(|n| n as u64);
-    let surface = 2 * (x * y + y * z + z * x);
-    afford(grid.corner_count() + surface / 2 * BYTES_PER_MEETING, &grid, fineness)?;
-    let samples = Samples::new(&solids.world, grid);
-    afford(grid.corner_count() + samples.meetings.len() as u64 * BYTES_PER_MEETING, &grid, fineness)?;
-    let quads = weave::weave(&samples);
-    let cut = triangles::cut(&solids.world, &quads, grid.spacing, fineness.tolerance);
-    let positions = snap::snap(&quads.vertices).map_err(Error::Usage)?;
-    let positions = positions.into_iter().map(|p| DVec3::from_array(p.map(f64::from))).collect();
-    let mesh = Mesh { positions, triangles: cut.triangles, groups: Vec::new() };
-    let (at_vertices, at_middles) = (cut.at_vertices, cut.at_middles);
-    Ok(Surface { mesh, grid, at_vertices, at_middles, unresolved: samples.unresolved })
+/// The surface on one grid. `before`: the distance that the grid before reached.
+fn on_grid(
+    solids: &Solids,
+    grid: Grid,
+    fineness: &Fineness,
+    before: Option<f64>,
+    watch: &Watch<'_>,
+) -> Result<Surface> {
+    let world = &solids.world;
+    let least = Rows::least_bytes(&grid);
+    let enough = |crossed: u64| {
+        let bytes = least + crossed * BYTES_PER_MEETING;
+        afford(bytes, fineness, || need(&grid, bytes, fineness, before))
+    };
+    enough(0)?;
+    let samples = Samples::new(world, grid, &enough, watch)?;
+    let net = Net::new(&samples);
+    let mut vertices = vertices::settled(world, &samples, &net, watch)?;
+    let mut positions = snap::snap(&vertices).map_err(Error::Usage)?;
+    // Nearer than this nobody asks.
+    let ignored = 0.5 * fineness.tolerance;
+    let (triangles, mut distances) = triangles::cut(world, &samples, &net, &positions, ignored, watch)?;
+    let moved = triangles::mend(&mut vertices, &triangles, &mut positions, grid.spacing);
+    let probes: Vec<_> =
+        vertices.iter().zip(&positions).map(|(v, p)| measure::Probe { point: *p, normal: v.normal }).collect();
+    let of_vertices = measure::all_distances(world, &probes, 2.0 * grid.spacing, ignored);
+    distances.mesh = distances.mesh.max(of_vertices) + moved;
+    distances.solid = distances.solid.max(measure::loose(&samples, &net, &positions, &triangles));
+    let mesh = Mesh { positions, triangles, ..Mesh::default() };
+    let topology =
+        check::check(&mesh).map_err(|what| Error::Mismatch(format!("the mesh made is not closed: {what}")))?;
+    Ok(Surface { mesh, grid, distances, topology })
 }
 
-/// Refuses what needs more memory than allowed.
-fn afford(bytes: u64, grid: &Grid, fineness: &Fineness) -> Result<()> {
+/// What a grid that needs `bytes` is, and what would fit.
+fn need(grid: &Grid, bytes: u64, fineness: &Fineness, before: Option<f64>) -> String {
+    let [x, y, z] = grid.cells;
+    let longest = x.max(y).max(z) as f64;
+    let share = (bytes as f64 / fineness.memory.max(1) as f64).sqrt() * 1.1;
+    let fits = match (before, fineness.cells) {
+        (_, Some(_)) => format!("--cells {}", (longest / share) as u64),
+        (Some(reached), None) => format!("--tolerance {:.2e}", reached * 1.01),
+        (None, None) => format!("--tolerance {:.2e}", grid.spacing * share / CELL),
+    };
+    format!("a grid of {x} x {y} x {z} cells ({fits} fits) needs")
+}
+
+/// Refuses what needs more memory than allowed; `what` says what.
+fn afford(bytes: u64, fineness: &Fineness, what: impl Fn() -> String) -> Result<()> {
     if bytes <= fineness.memory {
         return Ok(());
     }
-    let [x, y, z] = grid.cells;
     let (need, have) = (bytes.div_ceil(1 << 20), fineness.memory >> 20);
-    Err(Error::Usage(format!(
-        "a grid of {x} x {y} x {z} cells needs about {need} MiB, more than --memory {have}; give more, or a larger \
-         --tolerance, or fewer --cells"
-    )))
-}
-
-/// Which voxels of edge `spacing` have their middles inside.
-///
-/// # Errors
-/// A grid that needs more memory than allowed.
-pub fn voxels(solids: &Solids, spacing: f64, fineness: &Fineness) -> Result<Voxels> {
-    // Boxes are a few roundings wider than what is in them.
-    let counts = ((solids.hi - solids.lo) / spacing - ROUNDING).ceil().max(DVec3::ONE);
-    let around = Grid::around(solids.lo, solids.hi, spacing, DVec3::ZERO)?;
-    afford(around.corner_count() * 2, &around, fineness)?;
-    let size = counts.to_array().map(|n| n as usize);
-    // The voxels are in the middle of the box where its sides are no multiples of theirs.
-    let origin = 0.5 * (solids.lo + solids.hi) - 0.5 * spacing * (counts - 1.0);
-    let [nx, ny, _] = size;
-    let mut inside = vec![0; size.iter().product()];
-    inside.par_chunks_mut(nx * ny).enumerate().for_each(|(z, flags)| {
-        let start = origin - DVec3::X * spacing;
-        let length = (nx + 1) as f64 * spacing;
-        let line = |y: usize| start + spacing * DVec3::new(0.0, y as f64, z as f64);
-        let lines: Vec<Line> = (0..ny).map(|y| Line { org: line(y), dir: DVec3::X, length }).collect();
-        for (found, row) in lines::crossings(&solids.world, &lines).iter().zip(flags.chunks_exact_mut(nx)) {
-            lines::fill(found, spacing, row);
-        }
-    });
-    Ok(Voxels { origin, spacing, size, inside })
+    Err(Error::Usage(format!("{} about {need} MiB, more than --memory {have}", what())))
 }

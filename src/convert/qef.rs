@@ -1,39 +1,69 @@
-//! The point nearest to several planes, inside a box.
+//! The point nearest to several planes.
 
 use glam::{DMat3, DVec3};
 
-/// Directions in which the planes' normals spread less than this share of the most (squared) are left to the middle
-/// of the points: on a curved surface they say nothing, an edge of less than about 4 degrees is taken for curved.
-const FLAT: f64 = 1e-3;
-/// Points this much outside of the box, in its edges, count as inside.
-const SLACK: f64 = 1e-9;
+/// Directions in which the planes' normals spread less than this share of the most (squared) are not fixed by them.
+/// At the scale it is asked (see [`super::settle`]) what is less is curvature, or an edge of less than about 8
+/// degrees.
+const FLAT: f64 = 0.005;
 
-/// The point in the box `lo..hi` with the least sum of squared distances from the planes `(point, unit normal)`;
-/// where they do not fix it, the one nearest to the middle of their points. If it is outside of the box, the
-/// direction that is fixed least is given up, and so on: a corner, an edge, a surface.
+/// A point of the surface and the unit normal there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Where.
+    pub point: DVec3,
+    /// Unit normal, outward.
+    pub normal: DVec3,
+}
+
+/// The quadratic error of some planes: the sum of squared distances from them.
 ///
 /// Source: T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data", 2002, section 2.3; here
 /// with the eigenvectors of the normal equations.
-pub fn nearest(planes: &[(DVec3, DVec3)], lo: DVec3, hi: DVec3) -> DVec3 {
-    let middle = planes.iter().map(|p| p.0).sum::<DVec3>() / planes.len().max(1) as f64;
-    let (mut ata, mut atb) = (DMat3::ZERO, DVec3::ZERO);
-    for (point, normal) in planes {
-        let column = |x: f64| *normal * x;
-        ata += DMat3::from_cols(column(normal.x), column(normal.y), column(normal.z));
-        atb += *normal * normal.dot(*point - middle);
-    }
-    let mut axes = eigen(ata);
-    axes.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let fixed = axes.iter().filter(|(value, _)| *value > FLAT * axes[0].0).count();
-    let slack = SLACK * (hi - lo);
-    for rank in (1..=fixed).rev() {
-        let step = |(value, axis): &(f64, DVec3)| *axis * (axis.dot(atb) / value);
-        let point = middle + axes[..rank].iter().map(step).sum::<DVec3>();
-        if point.cmpge(lo - slack).all() && point.cmple(hi + slack).all() {
-            return point.clamp(lo, hi);
+#[derive(Clone, Copy, Debug)]
+pub struct Qef {
+    /// Mean of the points.
+    pub middle: DVec3,
+    /// Directions, the one that is fixed best first.
+    pub axes: [DVec3; 3],
+    /// How well each is fixed.
+    pub values: [f64; 3],
+    /// What is left to do along each.
+    steps: [f64; 3],
+}
+
+impl Qef {
+    /// Of `planes`, not empty.
+    pub fn new(planes: &[Plane]) -> Self {
+        let middle = planes.iter().map(|p| p.point).sum::<DVec3>() / planes.len().max(1) as f64;
+        let (mut ata, mut atb) = (DMat3::ZERO, DVec3::ZERO);
+        for Plane { point, normal } in planes {
+            let column = |x: f64| *normal * x;
+            ata += DMat3::from_cols(column(normal.x), column(normal.y), column(normal.z));
+            atb += *normal * normal.dot(*point - middle);
         }
+        let mut found = eigen(ata);
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let axes = found.map(|(_, axis)| axis);
+        Self { middle, axes, values: found.map(|(value, _)| value), steps: axes.map(|axis| axis.dot(atb)) }
     }
-    middle.clamp(lo, hi)
+
+    /// How many directions the planes fix: 1 for a surface, 2 for an edge, 3 for a corner.
+    pub fn rank(&self) -> usize {
+        1 + self.values[1..].iter().filter(|value| **value > FLAT * self.values[0]).count()
+    }
+
+    /// Whether all normals are the same.
+    pub fn is_flat(&self) -> bool {
+        self.values[1] <= 1e-9 * self.values[0]
+    }
+
+    /// The point with the least error in the first `rank` directions; in the others that of the middle.
+    pub fn point(&self, rank: usize) -> DVec3 {
+        let step =
+            |i: usize| if self.values[i] > 0.0 { self.axes[i] * (self.steps[i] / self.values[i]) } else { DVec3::ZERO };
+        self.middle + (0..rank).map(step).sum::<DVec3>()
+    }
 }
 
 /// Eigenvalues and unit eigenvectors of a symmetric matrix, by Jacobi's rotations (1846).
@@ -76,16 +106,17 @@ mod tests {
 
     #[test]
     fn corners_edges_and_planes() {
-        let (lo, hi) = (DVec3::ZERO, DVec3::ONE);
         let corner = DVec3::new(0.3, 0.6, 0.2);
-        let planes = |n: &[DVec3]| n.iter().map(|n| (corner + n.any_orthogonal_vector() * 0.2, *n)).collect::<Vec<_>>();
-        let got = nearest(&planes(&[DVec3::X, DVec3::Y, DVec3::Z]), lo, hi);
-        assert!((got - corner).length() < 1e-15, "{got}");
-        let got = nearest(&planes(&[DVec3::X, DVec3::Y]), lo, hi);
-        assert!((got.x - 0.3).abs() < 1e-15 && (got.y - 0.6).abs() < 1e-15, "{got}");
-        // Two planes that meet outside of the box: on neither of them, between their points.
-        let far = [(DVec3::new(0.5, 0.0, 0.0), DVec3::X), (DVec3::new(0.6, 1.0, 0.0), DVec3::new(0.9, -0.1, 0.0))];
-        let got = nearest(&far.map(|(p, n)| (p, n.normalize())), lo, hi);
-        assert!((0.5..0.6).contains(&got.x), "{got}");
+        let plane = |n: &DVec3| Plane { point: corner + n.any_orthogonal_vector() * 0.2, normal: *n };
+        let of = |n: &[DVec3]| Qef::new(&n.iter().map(plane).collect::<Vec<_>>());
+        let got = of(&[DVec3::X, DVec3::Y, DVec3::Z]);
+        assert!(got.rank() == 3 && (got.point(3) - corner).length() < 1e-15, "{got:?}");
+        let got = of(&[DVec3::X, DVec3::Y, DVec3::Y]);
+        let point = got.point(2);
+        assert!(got.rank() == 2 && !got.is_flat(), "{got:?}");
+        assert!((point.x - 0.3).abs() < 1e-15 && (point.y - 0.6).abs() < 1e-15, "{point}");
+        assert!((point.z - got.middle.z).abs() < 1e-15, "along the edge, the middle's");
+        let got = of(&[DVec3::Y, DVec3::Y]);
+        assert!(got.rank() == 1 && got.is_flat() && (got.point(1).y - 0.6).abs() < 1e-15);
     }
 }

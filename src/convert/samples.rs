@@ -2,13 +2,16 @@
 //!
 //! Corners are decided by the lines along x alone. An edge whose ends differ has a crossing in any case: the one of
 //! its line that turns the right way and is nearest to the edge. So the surface is closed, whatever rounding says
-//! about lines that graze it.
+//! about lines that graze it. Planes of lines are traced one by one; nothing is kept but what the surface needs.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::grid::Grid;
-use super::lines::{Crossing, Line, crossings, fill};
+use super::lines::{Crossing, Line, Tracer};
+use super::rows::{Rows, changes, differences};
+use super::watch::Watch;
+use crate::error::Result;
 use crate::scene::world::World;
 
 /// Where an edge of the grid meets the surface.
@@ -16,105 +19,164 @@ use crate::scene::world::World;
 pub struct Meeting {
     /// Number of the edge: its lower corner's, plus the number of corners times its axis.
     pub edge: u64,
+    /// Whether the edge enters: its upper corner is the one inside.
+    pub enters: bool,
     /// Where, world space.
     pub point: DVec3,
     /// Unit normal, outward.
     pub normal: DVec3,
 }
 
-/// Flags of all corners and the crossings of all edges whose ends differ.
+/// Rows of corners and the crossings of all edges whose ends differ.
 #[derive(Debug)]
 pub struct Samples {
     /// The grid.
     pub grid: Grid,
-    /// 1 for corners inside, by [`Grid::corner`].
-    pub inside: Vec<u8>,
+    /// Which corners are inside.
+    pub rows: Rows,
     /// In order of their edges.
     pub meetings: Vec<Meeting>,
-    /// Stretches inside or outside that begin and end between two neighbouring corners: parts of the solid that
-    /// the grid is too coarse for.
-    pub unresolved: u64,
+    /// Points of the surface that no edge stands for: the line goes in and out, or out and in, between two corners.
+    pub loose: Vec<DVec3>,
+}
+
+/// What the lines of one plane gave.
+#[derive(Default)]
+struct Sheet {
+    meetings: Vec<Meeting>,
+    loose: Vec<DVec3>,
+    /// Changes of each row, for lines along x.
+    rows: Vec<Vec<u32>>,
 }
 
 impl Samples {
-    /// Traces all lines of `grid`.
-    pub fn new(world: &World<f64>, grid: Grid) -> Self {
-        let [nx, ny, nz] = grid.corners();
-        let mut inside = vec![0; nx * ny * nz];
-        let plane = nx * ny;
-        inside.par_chunks_mut(plane).enumerate().for_each(|(z, flags)| flag_plane(world, &grid, z, flags));
-        let mut samples = Self { grid, inside, meetings: Vec::new(), unresolved: 0 };
-        for axis in 0..3 {
-            let rows = grid.corners()[(axis + 2) % 3];
-            let found: Vec<(Vec<Meeting>, u64)> =
-                (0..rows).into_par_iter().map(|row| samples.row(world, axis, row)).collect();
-            for (list, unresolved) in found {
-                samples.meetings.extend(list);
-                samples.unresolved += unresolved;
-            }
+    /// Traces all lines of `grid`. `afford` is told how many edges are crossed before they are kept.
+    ///
+    /// # Errors
+    /// Those of `afford` and `watch`.
+    pub fn new(world: &World<f64>, grid: Grid, afford: &dyn Fn(u64) -> Result<()>, watch: &Watch<'_>) -> Result<Self> {
+        let [_, ny, nz] = grid.corners();
+        (watch.more)((2 * nz + ny) as u64);
+        let along_x = |z| watch.next().map(|()| sheet_x(world, &grid, z));
+        let mut sheets = (0..nz).into_par_iter().map(along_x).collect::<Result<Vec<_>>>()?;
+        let rows = Rows::new(&grid, sheets.iter().flat_map(|s| s.rows.iter().map(Vec::as_slice)));
+        let along_x: usize = sheets.iter().map(|s| s.meetings.len()).sum();
+        afford(along_x as u64 + crossed(&rows, &grid))?;
+        let along_y = |z| watch.next().map(|()| sheet(world, &grid, &rows, 1, z));
+        let along_z = |y| watch.next().map(|()| sheet(world, &grid, &rows, 2, y));
+        sheets.extend((0..nz).into_par_iter().map(along_y).collect::<Result<Vec<_>>>()?);
+        sheets.extend((0..ny).into_par_iter().map(along_z).collect::<Result<Vec<_>>>()?);
+        let (mut meetings, mut loose) = (Vec::new(), Vec::new());
+        for sheet in sheets {
+            meetings.extend(sheet.meetings);
+            loose.extend(sheet.loose);
         }
-        samples.meetings.sort_unstable_by_key(|m| m.edge);
-        samples
+        meetings.sort_unstable_by_key(|m| m.edge);
+        Ok(Self { grid, rows, meetings, loose })
     }
 
     /// The crossing of an edge whose ends differ.
     pub fn meeting(&self, edge: u64) -> Option<&Meeting> {
         self.meetings.binary_search_by_key(&edge, |m| m.edge).ok().map(|i| &self.meetings[i])
     }
-
-    /// Whether corner `number` is inside.
-    pub fn is_inside(&self, number: u64) -> bool {
-        self.inside[number as usize] != 0
-    }
-
-    /// The meetings of the edges along `axis` whose corners have the number `row` on the second axis after it.
-    fn row(&self, world: &World<f64>, axis: usize, row: usize) -> (Vec<Meeting>, u64) {
-        let (grid, corners) = (&self.grid, self.grid.corners());
-        let (second, third) = ((axis + 1) % 3, (axis + 2) % 3);
-        let lines: Vec<Line> = (0..corners[second]).map(|i| grid_line(grid, axis, i, row)).collect();
-        let (mut list, mut unresolved) = (Vec::new(), 0);
-        for (i, found) in crossings(world, &lines).iter().enumerate() {
-            let mut at = [0; 3];
-            (at[second], at[third]) = (i, row);
-            // Distances start one cell before the first corner.
-            let cell = |c: &Crossing| (c.t / grid.spacing).floor();
-            unresolved += found.windows(2).filter(|pair| cell(&pair[0]) == cell(&pair[1])).count() as u64;
-            for step in 0..corners[axis] - 1 {
-                at[axis] = step;
-                let low = grid.corner(at);
-                at[axis] = step + 1;
-                let (is, will) = (self.is_inside(low), self.is_inside(grid.corner(at)));
-                if is != will {
-                    let edge = low + axis as u64 * grid.corner_count();
-                    list.push(meeting(grid, &lines[i], found, axis, (step, edge), will));
-                }
-            }
-        }
-        (list, unresolved)
-    }
 }
 
-/// The line along `axis` through corners with numbers `i` and `row` on the axes after it, one cell longer at both
-/// ends.
-fn grid_line(grid: &Grid, axis: usize, i: usize, row: usize) -> Line {
-    let mut at = [0; 3];
-    (at[(axis + 1) % 3], at[(axis + 2) % 3]) = (i, row);
+/// The rows alone.
+///
+/// # Errors
+/// Those of `watch`.
+pub fn rows_of(world: &World<f64>, grid: &Grid, watch: &Watch<'_>) -> Result<Rows> {
+    let nz = grid.corners()[2];
+    (watch.more)(nz as u64);
+    let rows = |z| watch.next().map(|()| sheet_x(world, grid, z).rows);
+    let planes = (0..nz).into_par_iter().map(rows).collect::<Result<Vec<_>>>()?;
+    Ok(Rows::new(grid, planes.iter().flatten().map(Vec::as_slice)))
+}
+
+/// Number of edges along y and z whose ends differ.
+fn crossed(rows: &Rows, grid: &Grid) -> u64 {
+    let [_, ny, nz] = grid.corners();
+    let count = |a: &[u32], b: &[u32]| differences(a, b).iter().map(|d| u64::from(d.x.end - d.x.start)).sum::<u64>();
+    let of = |z: usize| {
+        let along_y: u64 = (1..ny).map(|y| count(rows.row(y - 1, z), rows.row(y, z))).sum();
+        let along_z: u64 = if z > 0 { (0..ny).map(|y| count(rows.row(y, z - 1), rows.row(y, z))).sum() } else { 0 };
+        along_y + along_z
+    };
+    (0..nz).into_par_iter().map(of).sum()
+}
+
+/// The line along `axis` through the corner `at`, one cell longer at both ends: corner i is at (i + 1) spacing.
+pub fn grid_line(grid: &Grid, axis: usize, mut at: [usize; 3]) -> Line {
+    at[axis] = 0;
     let dir = DVec3::AXES[axis];
     let length = (grid.cells[axis] + 2) as f64 * grid.spacing;
     Line { org: grid.position(at) - dir * grid.spacing, dir, length }
 }
 
-/// Flags of the corners of plane `z`. Outermost corners stay outside: all solids are within the grid.
-fn flag_plane(world: &World<f64>, grid: &Grid, z: usize, flags: &mut [u8]) {
+/// The lines along x of plane `z`. Outermost corners stay outside: all solids are within the grid.
+fn sheet_x(world: &World<f64>, grid: &Grid, z: usize) -> Sheet {
     let [nx, ny, nz] = grid.corners();
+    let mut sheet = Sheet { rows: vec![Vec::new(); ny], ..Sheet::default() };
     if z == 0 || z == nz - 1 {
-        return;
+        return sheet;
     }
-    let lines: Vec<Line> = (1..ny - 1).map(|y| grid_line(grid, 0, y, z)).collect();
-    for (y, found) in crossings(world, &lines).iter().enumerate() {
-        let row = &mut flags[nx * (y + 1)..nx * (y + 2)];
-        fill(found, grid.spacing, row);
-        (row[0], row[nx - 1]) = (0, 0);
+    let lines: Vec<Line> = (1..ny - 1).map(|y| grid_line(grid, 0, [0, y, z])).collect();
+    Tracer::default().each(world, &lines, |i, found| {
+        let row = changes(found, grid.spacing, nx);
+        let needed = row.iter().enumerate().map(|(k, &x)| (x as usize - 1, k % 2 == 0));
+        sheet.take(grid, &lines[i], found, (0, [0, i + 1, z]), needed);
+        sheet.rows[i + 1] = row;
+    });
+    sheet
+}
+
+/// The lines along `axis`, 1 or 2, whose corners have the number `level` on the third axis, which is not x.
+fn sheet(world: &World<f64>, grid: &Grid, rows: &Rows, axis: usize, level: usize) -> Sheet {
+    let corners = grid.corners();
+    let mut sheet = Sheet::default();
+    if level == 0 || level == corners[3 - axis] - 1 {
+        return sheet;
+    }
+    let at = |step: usize| if axis == 1 { (step, level) } else { (level, step) };
+    // Crossed edges: of which line, which edge of it, whether it enters.
+    let mut needed: Vec<(u32, u32, bool)> = Vec::new();
+    for step in 0..corners[axis] - 1 {
+        let [(y, z), (next_y, next_z)] = [at(step), at(step + 1)];
+        for difference in differences(rows.row(y, z), rows.row(next_y, next_z)) {
+            needed.extend(difference.x.map(|x| (x, step as u32, difference.enters)));
+        }
+    }
+    needed.sort_unstable();
+    let place = |x: usize| if axis == 1 { [x, 0, level] } else { [x, level, 0] };
+    let lines: Vec<Line> = (1..corners[0] - 1).map(|x| grid_line(grid, axis, place(x))).collect();
+    Tracer::default().each(world, &lines, |i, found| {
+        let of_line =
+            needed.partition_point(|n| (n.0 as usize) < i + 1)..needed.partition_point(|n| n.0 as usize <= i + 1);
+        let of_line = needed[of_line].iter().map(|n| (n.1 as usize, n.2));
+        sheet.take(grid, &lines[i], found, (axis, place(i + 1)), of_line);
+    });
+    sheet
+}
+
+impl Sheet {
+    /// The meetings of the edges that a line needs, and the crossings that none stands for.
+    fn take(
+        &mut self,
+        grid: &Grid,
+        line: &Line,
+        found: &[Crossing],
+        (axis, mut at): (usize, [usize; 3]),
+        needed: impl Iterator<Item = (usize, bool)>,
+    ) {
+        for (step, enters) in needed {
+            at[axis] = step;
+            let edge = grid.corner(at) + axis as u64 * grid.corner_count();
+            self.meetings.push(meeting(grid, line, found, axis, (step, edge), enters));
+        }
+        let cell = |c: &Crossing| (c.t / grid.spacing).floor();
+        for pair in found.windows(2).filter(|pair| cell(&pair[0]) == cell(&pair[1])) {
+            self.loose.extend(pair.iter().map(|c| line.org + line.dir * c.t));
+        }
     }
 }
 
@@ -134,5 +196,6 @@ fn meeting(
     // it.
     let facing = if enters { -DVec3::AXES[axis] } else { DVec3::AXES[axis] };
     let (t, normal) = best.map_or((0.5 * (low + high), facing), |c| (c.t.clamp(low, high), c.normal));
-    Meeting { edge, point: line.org + line.dir * t, normal }
+    let normal = if normal == DVec3::ZERO { facing } else { normal };
+    Meeting { edge, enters, point: line.org + line.dir * t, normal }
 }

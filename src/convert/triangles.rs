@@ -1,86 +1,129 @@
-//! Quadrilaterals into triangles, and how far they are from the surface.
+//! Quadrilaterals into triangles.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
-use super::lines::{Line, crossings};
-use super::weave::Quads;
+use super::check::area;
+use super::measure::{Distances, Probe, distances, from_triangle};
+use super::samples::{Meeting, Samples};
+use super::vertices::Vertex;
+use super::watch::Watch;
+use super::weave::Net;
+use crate::error::Result;
 use crate::scene::world::World;
 
-/// Quadrilaterals flatter than this share of their size have no better diagonal.
-const PLANE: f64 = 1e-9;
-
-/// Triangles, and the largest distances from the surface that were seen. Distances are measured along up to four
-/// lines through each point, so the true ones are not larger.
-#[derive(Debug)]
-pub struct Triangles {
-    /// Numbers of vertices, counter-clockwise from outside.
-    pub triangles: Vec<[u32; 3]>,
-    /// Of a vertex, scene units.
-    pub at_vertices: f64,
-    /// Of the middle of a quadrilateral that is not flat, scene units.
-    pub at_middles: f64,
-}
-
-/// Distances of points from the surface, looked for up to `reach` away: first along the lines given, then, where
-/// that gave more than `enough`, along the axes.
-fn distances(world: &World<f64>, points: &[(DVec3, DVec3)], reach: f64, enough: f64) -> Vec<f64> {
-    let along = |(point, dir): (DVec3, DVec3)| Line { org: point - dir * reach, dir, length: 2.0 * reach };
-    let nearest = |lines: &[Line]| -> Vec<f64> {
-        let near =
-            |list: &Vec<_>| list.iter().map(|c: &super::lines::Crossing| (c.t - reach).abs()).fold(reach, f64::min);
-        crossings(world, lines).iter().map(near).collect()
-    };
-    let lines: Vec<Line> = points.iter().map(|(p, n)| along((*p, n.normalize_or(DVec3::Z)))).collect();
-    let mut found = nearest(&lines);
-    let far: Vec<usize> = (0..points.len()).filter(|&i| found[i] > enough).collect();
-    for axis in DVec3::AXES {
-        let lines: Vec<Line> = far.iter().map(|&i| along((points[i].0, axis))).collect();
-        for (&i, distance) in far.iter().zip(nearest(&lines)) {
-            found[i] = found[i].min(distance);
-        }
-    }
-    found
-}
+/// Quadrilaterals cut together.
+const CHUNK: usize = 2048;
+/// Triangles whose area is below this share of a cell's face have none.
+const NO_AREA: f64 = 1e-9;
+/// First step, in cells, of a vertex that makes a triangle without area.
+const NUDGE: f64 = 1e-4;
+/// Steps of such vertices before giving up; each is twice as long as the one before.
+const NUDGES: i32 = 8;
 
 /// Cuts each quadrilateral along the diagonal whose middle is nearer to the surface: along an edge, not across it.
-pub fn cut(world: &World<f64>, quads: &Quads, spacing: f64, tolerance: f64) -> Triangles {
-    let reach = 2.0 * spacing;
-    let vertices: Vec<_> = quads.vertices.iter().map(|v| (v.position, v.normal)).collect();
-    let at_vertices = distances(world, &vertices, reach, 0.5 * tolerance).into_iter().fold(0.0, f64::max);
-    let place = |q: &[u32; 4]| q.map(|v| quads.vertices[v as usize].position);
-    let bent: Vec<bool> = quads
-        .quads
-        .iter()
-        .map(|quad| {
-            let [a, b, c, d] = place(quad);
-            (b - a).dot((c - a).cross(d - a)).abs() > PLANE * spacing.powi(3)
-        })
-        .collect();
-    let mut middles = Vec::new();
-    for (i, quad) in quads.quads.iter().enumerate().filter(|(i, _)| bent[*i]) {
-        let [a, b, c, d] = place(quad);
-        middles.extend([(0.5 * (a + c), quads.normals[i]), (0.5 * (b + d), quads.normals[i])]);
+/// Distances of the triangles' middles from the surface, and of the crossings from the triangles, are taken along.
+///
+/// # Errors
+/// Those of `watch`.
+pub fn cut(
+    world: &World<f64>,
+    samples: &Samples,
+    net: &Net,
+    positions: &[DVec3],
+    enough: f64,
+    watch: &Watch<'_>,
+) -> Result<(Vec<[u32; 3]>, Distances)> {
+    let spacing = samples.grid.spacing;
+    (watch.more)(net.quads.len().div_ceil(CHUNK) as u64);
+    let chunk = |(quads, meetings): (&[[u32; 4]], &[Meeting])| {
+        watch.next()?;
+        Ok(cut_some(world, quads, meetings, positions, spacing, enough))
+    };
+    let work = net.quads.par_chunks(CHUNK).zip(samples.meetings.par_chunks(CHUNK));
+    let chunks = work.map(chunk).collect::<Result<Vec<_>>>()?;
+    let (mut triangles, mut all) = (Vec::with_capacity(2 * net.quads.len()), Distances::default());
+    for (list, distances) in chunks {
+        triangles.extend(list);
+        all = all.max(distances);
     }
-    let found = distances(world, &middles, reach, 0.5 * tolerance);
-    let mut of_bent = found.chunks_exact(2);
-    let mut cut = Triangles { triangles: Vec::with_capacity(2 * quads.quads.len()), at_vertices, at_middles: 0.0 };
-    for (i, quad) in quads.quads.iter().enumerate() {
-        let other = match bent[i] {
-            // As many pairs as bent quadrilaterals: one is left for each.
-            true => of_bent.next().is_some_and(|pair| {
-                cut.at_middles = cut.at_middles.max(pair[0].min(pair[1]));
-                pair[1] < pair[0]
-            }),
-            false => folds(place(quad), quads.normals[i]),
-        };
-        let [a, b, c, d] = *quad;
-        cut.triangles.extend(if other { [[b, c, d], [b, d, a]] } else { [[a, b, c], [a, c, d]] });
-    }
-    cut
+    Ok((triangles, all))
 }
 
-/// Whether the first diagonal of a flat quadrilateral would turn one of its triangles over.
-fn folds([a, b, c, d]: [DVec3; 4], normal: DVec3) -> bool {
-    let side = |p: DVec3, q: DVec3, r: DVec3| (q - p).cross(r - p).dot(normal);
-    side(a, b, c).min(side(a, c, d)) < side(b, c, d).min(side(b, d, a))
+fn cut_some(
+    world: &World<f64>,
+    quads: &[[u32; 4]],
+    meetings: &[Meeting],
+    positions: &[DVec3],
+    spacing: f64,
+    enough: f64,
+) -> (Vec<[u32; 3]>, Distances) {
+    let place = |i: u32| positions[i as usize];
+    let mut middles = Vec::with_capacity(2 * quads.len());
+    for (quad, Meeting { normal, .. }) in quads.iter().zip(meetings) {
+        let [a, b, c, d] = quad.map(place);
+        middles.extend([0.5 * (a + c), 0.5 * (b + d)].map(|point| Probe { point, normal: *normal }));
+    }
+    let of_middles = distances(world, &middles, 2.0 * spacing, enough);
+    let (mut triangles, mut found) = (Vec::with_capacity(2 * quads.len()), Distances::default());
+    let mut inner = Vec::with_capacity(2 * quads.len());
+    for ((quad, meeting), away) in quads.iter().zip(meetings).zip(of_middles.chunks_exact(2)) {
+        let [a, b, c, d] = *quad;
+        let ways = [[[a, b, c], [a, c, d]], [[b, c, d], [b, d, a]]];
+        let cost = |way: usize| {
+            let corners = ways[way].map(|t| t.map(place));
+            let flat = corners.iter().any(|t| area(*t) < NO_AREA * spacing * spacing);
+            let turned = corners.iter().map(|t| turned(*t, meeting.normal)).fold(0.0, f64::max);
+            // Distances within a hundredth of what is asked for are the same.
+            (flat, away[way].max(0.01 * enough), turned)
+        };
+        let (first, second) = (cost(0), cost(1));
+        let way = usize::from(second < first);
+        found.mesh = found.mesh.max(away[way]);
+        let corners = ways[way].map(|t| t.map(place));
+        found.solid =
+            found.solid.max(from_triangle(meeting.point, corners[0]).min(from_triangle(meeting.point, corners[1])));
+        inner.extend(corners.map(|[a, b, c]| Probe { point: (a + b + c) / 3.0, normal: meeting.normal }));
+        triangles.extend(ways[way]);
+    }
+    let of_inner = distances(world, &inner, 2.0 * spacing, enough);
+    found.mesh = of_inner.into_iter().fold(found.mesh, f64::max);
+    (triangles, found)
+}
+
+/// How far a triangle's normal turns away: 0 if it is `normal`, 2 if it is the opposite.
+fn turned([a, b, c]: [DVec3; 3], normal: DVec3) -> f64 {
+    1.0 - (b - a).cross(c - a).normalize_or_zero().dot(normal)
+}
+
+/// Moves vertices that make triangles without area, by as little as helps. Gives the longest way moved.
+pub fn mend(vertices: &mut [Vertex], triangles: &[[u32; 3]], positions: &mut [DVec3], spacing: f64) -> f64 {
+    let mut longest = 0.0;
+    for round in 0..NUDGES {
+        let flat = |t: &&[u32; 3]| area(t.map(|v| positions[v as usize])) < NO_AREA * spacing * spacing;
+        let mut moved: Vec<u32> =
+            triangles.iter().filter(flat).map(|t| t[middle_one(t.map(|v| positions[v as usize]))]).collect();
+        if moved.is_empty() {
+            break;
+        }
+        moved.sort_unstable();
+        moved.dedup();
+        let step = NUDGE * spacing * 2f64.powi(round);
+        for v in moved {
+            let vertex = &mut vertices[v as usize];
+            // Any direction does; neighbours should not take the same.
+            let (sin, cos) = (f64::from(v) * 2.399_963).sin_cos();
+            let (x, y) = vertex.normal.any_orthonormal_pair();
+            vertex.position += step * (0.6 * (x * cos + y * sin) - 0.8 * vertex.normal);
+            positions[v as usize] = vertex.position.as_vec3().as_dvec3();
+            longest = f64::max(longest, 2.0 * step);
+        }
+    }
+    longest
+}
+
+/// The corner opposite to the longest side.
+fn middle_one([a, b, c]: [DVec3; 3]) -> usize {
+    let sides = [b.distance_squared(c), c.distance_squared(a), a.distance_squared(b)];
+    (0..3).fold(0, |best, i| if sides[i] > sides[best] { i } else { best })
 }

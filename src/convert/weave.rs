@@ -1,4 +1,4 @@
-//! From samples to a closed, manifold mesh.
+//! From samples to a closed, manifold net.
 //!
 //! Every loop of every cell (see [`super::cell`]) gets a vertex, every crossed edge of the grid a quadrilateral
 //! between the four cells around it. Such a mesh is a manifold unless two cells share a face on which one and the
@@ -8,71 +8,72 @@
 
 use std::collections::HashSet;
 
-use glam::DVec3;
-
-use super::cell::{NONE, face_pairs, is_ambiguous, loops};
-use super::qef;
+use super::cell::{NONE, face_pairs, is_ambiguous, loops, lower_corner};
 use super::samples::{Meeting, Samples};
 
 /// A cell that the surface passes.
 #[derive(Clone, Copy, Debug)]
-struct Cell {
+pub struct Cell {
     /// Number of its lower corner.
-    corner: u64,
+    pub corner: u64,
+    /// Number of loops.
+    pub count: u8,
     /// A bit for each corner inside.
     inside: u8,
     /// Loop of each edge.
     loops: [u8; 12],
-    /// Number of loops.
-    count: u8,
     /// Vertex of its first loop.
-    first: u32,
+    pub first: u32,
 }
 
-/// A vertex for each loop.
-#[derive(Clone, Copy, Debug)]
-pub struct Vertex {
-    /// Where.
-    pub position: DVec3,
-    /// Mean of its loop's normals, not unit.
-    pub normal: DVec3,
-    /// Middle of its cell.
-    pub middle: DVec3,
-}
-
-/// Vertices, and four of them for each crossed edge, counter-clockwise from outside, with the normal there.
-#[derive(Debug, Default)]
-pub struct Quads {
-    /// The vertices.
-    pub vertices: Vec<Vertex>,
-    /// Numbers of vertices around each crossed edge.
+/// Cells with their vertices, and four vertices for each crossed edge.
+#[derive(Debug)]
+pub struct Net {
+    /// In order of their corners.
+    pub cells: Vec<Cell>,
+    /// Numbers of vertices around each crossed edge, counter-clockwise from outside, in order of the edges.
     pub quads: Vec<[u32; 4]>,
-    /// Normal of the surface where the edge crosses it.
-    pub normals: Vec<DVec3>,
+    /// Number of vertices.
+    pub vertices: u32,
 }
 
-/// Makes the mesh.
-pub fn weave(samples: &Samples) -> Quads {
-    let mut cells = active(samples);
-    part(samples, &mut cells);
-    let mut quads = Quads::default();
-    for cell in &mut cells {
-        cell.first = quads.vertices.len() as u32;
-        quads.vertices.extend((0..cell.count).map(|number| vertex(samples, cell, number)));
-    }
-    for meeting in &samples.meetings {
-        if let Some(quad) = around(samples, &cells, meeting) {
-            quads.quads.push(quad);
-            quads.normals.push(meeting.normal);
+impl Net {
+    /// The net of `samples`.
+    pub fn new(samples: &Samples) -> Self {
+        let mut cells = active(samples);
+        part(samples, &mut cells);
+        let mut vertices = 0;
+        for cell in &mut cells {
+            cell.first = vertices;
+            vertices += u32::from(cell.count);
         }
+        let quads = samples.meetings.iter().filter_map(|meeting| around(samples, &cells, meeting)).collect();
+        Self { cells, quads, vertices }
     }
-    quads
+
+    /// The cell with a number, if the surface passes it.
+    pub fn cell(&self, corner: u64) -> Option<&Cell> {
+        find(&self.cells, corner).map(|i| &self.cells[i])
+    }
+}
+
+impl Cell {
+    /// The crossings of the edges of one of its loops.
+    pub fn meetings<'a>(&self, samples: &'a Samples, number: u8) -> impl Iterator<Item = &'a Meeting> {
+        let (grid, cell) = (&samples.grid, *self);
+        let at = grid.corner_at(cell.corner);
+        (0..12).filter(move |&edge| cell.loops[edge] == number).filter_map(move |edge| {
+            let low = lower_corner(edge);
+            let corner = grid.corner([at[0] + (low & 1), at[1] + (low >> 1 & 1), at[2] + (low >> 2)]);
+            samples.meeting(corner + (edge / 4) as u64 * grid.corner_count())
+        })
+    }
 }
 
 /// Bits of a cell's corners.
 fn bits(samples: &Samples, at: [usize; 3]) -> u8 {
-    let corner = |c: usize| samples.grid.corner([at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)]);
-    (0..8).fold(0, |bits, c| bits | u8::from(samples.is_inside(corner(c))) << c)
+    let inside = |c: usize| samples.rows.is_inside([at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)]);
+    (0..8).fold(0, |bits, c| bits | u8::from(inside(c)) << c)
 }
 
 /// The cells around crossed edges, in order of their corners.
@@ -148,26 +149,6 @@ fn part(samples: &Samples, cells: &mut [Cell]) {
     }
 }
 
-/// The vertex of a loop.
-fn vertex(samples: &Samples, cell: &Cell, number: u8) -> Vertex {
-    let grid = &samples.grid;
-    let at = grid.corner_at(cell.corner);
-    let mut planes = [(DVec3::ZERO, DVec3::ZERO); 12];
-    let mut count = 0;
-    for edge in (0..12).filter(|&e| cell.loops[e] == number) {
-        let low = super::cell::lower_corner(edge);
-        let corner = grid.corner([at[0] + (low & 1), at[1] + (low >> 1 & 1), at[2] + (low >> 2)]);
-        if let Some(meeting) = samples.meeting(corner + (edge / 4) as u64 * grid.corner_count()) {
-            planes[count] = (meeting.point, meeting.normal);
-            count += 1;
-        }
-    }
-    let planes = &planes[..count];
-    let (lo, hi) = (grid.position(at), grid.position(at.map(|n| n + 1)));
-    let normal = planes.iter().map(|p| p.1).sum();
-    Vertex { position: qef::nearest(planes, lo, hi), normal, middle: 0.5 * (lo + hi) }
-}
-
 /// The quadrilateral of a crossed edge.
 fn around(samples: &Samples, cells: &[Cell], meeting: &Meeting) -> Option<[u32; 4]> {
     let count = samples.grid.corner_count();
@@ -179,7 +160,7 @@ fn around(samples: &Samples, cells: &[Cell], meeting: &Meeting) -> Option<[u32; 
         *slot = cell.first + u32::from(cell.loops[edge]);
     }
     // From inside to outside along the axis, the outward side is the one the order is counter-clockwise from.
-    if !samples.is_inside(low) {
+    if meeting.enters {
         quad.reverse();
     }
     Some(quad)

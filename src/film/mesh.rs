@@ -117,7 +117,7 @@ mod tests {
         let positions = [[0.0, 0.0, 0.0], [1.5, 0.0, 1e-7], [0.0, -3e9, 0.0], [0.1, 0.2, 0.3]];
         let positions = positions.map(|p: [f32; 3]| DVec3::from_array(p.map(f64::from))).to_vec();
         let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-        let mesh = Mesh { positions, triangles, groups: Vec::new() };
+        let mesh = Mesh { positions, triangles, groups: Vec::new(), ..Mesh::default() };
         let dir = tempfile::tempdir().unwrap();
         for name in ["a.stl", "a.obj", "a.PLY"] {
             let path = dir.path().join(name);

@@ -90,4 +90,13 @@ impl Mesh {
         };
         (0..self.triangles.len()).map(tetrahedron).sum()
     }
+
+    /// Sum of the triangles' areas.
+    pub fn area(&self) -> f64 {
+        let triangle = |i| {
+            let [a, b, c] = self.corners(i);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        (0..self.triangles.len()).map(triangle).sum()
+    }
 }

@@ -242,14 +242,13 @@ pub fn write_stretches(path: &Path, stretches: &[Stretch]) -> Result<u64> {
     })
 }
 
-/// Writes flags of voxels as `|u1` of shape (nz, ny, nx): x runs fastest. `size` is nx, ny, nz; as many flags.
+/// Writes flags of voxels as `|u1` of shape (nz, ny, nx): x runs fastest. `size` is nx, ny; `planes` have nx ny flags.
 ///
 /// # Errors
 /// [`Error::Io`].
-pub fn write_voxels(path: &Path, size: [usize; 3], flags: &[u8]) -> Result<u64> {
-    let [nx, ny, _] = size;
-    let row = [ny as u64, nx as u64];
-    write_array(path, &Descr::Plain("|u1".to_owned()), &row, flags.chunks(nx * ny), |plane: &&[u8], bytes| {
+pub fn write_voxels(path: &Path, size: [usize; 2], planes: impl IntoIterator<Item = Vec<u8>>) -> Result<u64> {
+    let row = [size[1] as u64, size[0] as u64];
+    write_array(path, &Descr::Plain("|u1".to_owned()), &row, planes, |plane, bytes| {
         bytes.extend_from_slice(plane);
         1
     })
