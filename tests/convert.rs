@@ -188,7 +188,12 @@ fn cubes_keep_their_corners_and_edges() {
             let corner =
                 DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2)) * 2.0 - 1.0;
             let least = local.iter().map(|p| p.distance(corner)).fold(f64::INFINITY, f64::min);
-            assert!(least < 1e-6, "cube {number}: corner {corner} is {least} away");
+            assert!(
+                least < 1e-6,
+                "cube {number}: at {:.3} h {} corner {corner} is {least} away",
+                transform.transform_point3(corner),
+                found.grid.spacing
+            );
         }
         for p in &local {
             let out = p.abs().max_element() - 1.0;
@@ -291,11 +296,12 @@ fn rays_see_the_same_solid() {
     {
         let description = load(&format!("builtin:{name}"), &LoadOptions::default()).unwrap();
         let solids = Solids::new(&description, &[solid.into()]).unwrap();
-        let fineness = Fineness { tolerance: 1.0, cells: Some(64), memory: MEMORY };
+        let tolerance = (solids.hi - solids.lo).length() / 256.0;
+        let fineness = Fineness { tolerance, cells: None, memory: MEMORY };
         let found = surface(&solids, &fineness, &Watch::NONE).unwrap();
         manifold(&found.mesh, solid);
         let (middle, size) = (0.5 * (solids.lo + solids.hi), (solids.hi - solids.lo).length());
-        let near = 0.002 * size;
+        let near = size / 256.0;
         let meshed = {
             let mut d = Description::new("mesh");
             d.meshes.push(found.mesh.into());

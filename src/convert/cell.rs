@@ -23,8 +23,8 @@ const fn edge_at(axis: usize, corner: usize) -> usize {
     4 * axis + (corner >> ((axis + 1) % 3) & 1) + 2 * (corner >> ((axis + 2) % 3) & 1)
 }
 
-/// The four corners of a face.
-fn face_corners(face: usize) -> [usize; 4] {
+/// The four corners of a face, in order around it.
+pub fn face_corners(face: usize) -> [usize; 4] {
     let (a, s) = (face / 2, face % 2);
     let (b, c) = (1 << ((a + 1) % 3), 1 << ((a + 2) % 3));
     [0, b, b + c, c].map(|corner| corner + (s << a))

@@ -12,6 +12,8 @@ use crate::scene::world::World;
 
 /// Points measured together.
 const CHUNK: usize = 4096;
+/// How far lines pass beside a point, as a share of the distance that is near enough.
+const BESIDE: f64 = 0.25;
 /// Cells around a point in which the nearest triangle is looked for.
 const AROUND: usize = 2;
 
@@ -46,20 +48,30 @@ pub struct Probe {
     pub normal: DVec3,
 }
 
-/// Distances of points from the surface, looked for up to `reach` away: first along the normals, then, where that
-/// gave more than `enough`, along the axes.
+/// Distances of points from the surface, looked for up to `reach` away: first along the normals; where that gave more
+/// than `enough`, along other lines, and along lines beside the point, which its distance from them is added to: a
+/// line that is to meet a corner may just miss it.
 pub fn distances(world: &World<f64>, probes: &[Probe], reach: f64, enough: f64) -> Vec<f64> {
     let mut tracer = Tracer::default();
-    let lines: Vec<Line> = probes.iter().map(|p| Line::through(p.point, p.normal, reach)).collect();
-    let mut away = |lines: &[Line]| -> Vec<f64> {
-        tracer.nearest(world, lines).iter().map(|c| c.map_or(reach, |c| (c.t - reach).abs())).collect()
+    let mut found = vec![reach; probes.len()];
+    let mut look = |found: &mut [f64], beside: f64, line: &dyn Fn(&Probe) -> (DVec3, DVec3)| {
+        let far: Vec<usize> = (0..probes.len()).filter(|&i| found[i] > enough).collect();
+        let lines = far.iter().map(|&i| line(&probes[i])).map(|(point, dir)| Line::through(point, dir, reach));
+        let lines: Vec<Line> = lines.collect();
+        for (&i, crossing) in far.iter().zip(tracer.nearest(world, &lines)) {
+            let away = crossing.map_or(reach, |c| beside + (c.t - reach).abs());
+            found[i] = found[i].min(away);
+        }
     };
-    let mut found = away(&lines);
-    let far: Vec<usize> = (0..probes.len()).filter(|&i| found[i] > enough).collect();
+    look(&mut found, 0.0, &|p| (p.point, p.normal));
     for axis in DVec3::AXES {
-        let lines: Vec<Line> = far.iter().map(|&i| Line::through(probes[i].point, axis, reach)).collect();
-        for (&i, distance) in far.iter().zip(away(&lines)) {
-            found[i] = found[i].min(distance);
+        look(&mut found, 0.0, &|p| (p.point, axis));
+    }
+    let beside = BESIDE * enough;
+    for i in 0..6 {
+        let step = DVec3::AXES[i % 3] * if i < 3 { beside } else { -beside };
+        for axis in DVec3::AXES {
+            look(&mut found, beside, &|p| (p.point + step, axis));
         }
     }
     found
@@ -71,9 +83,9 @@ pub fn all_distances(world: &World<f64>, probes: &[Probe], reach: f64, enough: f
     probes.par_chunks(CHUNK).map(largest).reduce(|| 0.0, f64::max)
 }
 
-/// The largest distance of the points of `samples` that no edge stands for from the triangles nearby.
-pub fn loose(samples: &Samples, net: &Net, positions: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
-    if samples.loose.is_empty() {
+/// The largest distance of `points` of the surface from the triangles nearby.
+pub fn from_mesh(samples: &Samples, net: &Net, positions: &[DVec3], triangles: &[[u32; 3]], points: &[DVec3]) -> f64 {
+    if points.is_empty() {
         return 0.0;
     }
     let mut starts = vec![0u32; positions.len() + 1];
@@ -106,7 +118,7 @@ pub fn loose(samples: &Samples, net: &Net, positions: &[DVec3], triangles: &[[u3
         let distance = |i: &u32| from_triangle(*point, triangles[*i as usize].map(|v| positions[v as usize]));
         list.iter().map(distance).fold(AROUND as f64 * grid.spacing, f64::min)
     };
-    samples.loose.par_iter().map(away).reduce(|| 0.0, f64::max)
+    points.par_iter().map(away).reduce(|| 0.0, f64::max)
 }
 
 /// Distance of a point from a triangle.

@@ -121,19 +121,23 @@ fn on_grid(
         afford(bytes, fineness, || need(&grid, bytes, fineness, before))
     };
     enough(0)?;
-    let samples = Samples::new(world, grid, &enough, watch)?;
-    let net = Net::new(&samples);
+    let mut samples = Samples::new(world, grid, &enough, watch)?;
+    let net = Net::new(&samples, Some(world));
     let mut vertices = vertices::settled(world, &samples, &net, watch)?;
     let mut positions = snap::snap(&vertices).map_err(Error::Usage)?;
     // Nearer than this nobody asks.
     let ignored = 0.5 * fineness.tolerance;
-    let (triangles, mut distances) = triangles::cut(world, &samples, &net, &positions, ignored, watch)?;
-    let moved = triangles::mend(&mut vertices, &triangles, &mut positions, grid.spacing);
+    let cut = triangles::cut(world, &samples, &net, &positions, ignored, watch)?;
+    let moved = triangles::mend(&mut vertices, &cut.triangles, &mut positions, grid.spacing);
     let probes: Vec<_> =
         vertices.iter().zip(&positions).map(|(v, p)| measure::Probe { point: *p, normal: v.normal }).collect();
     let of_vertices = measure::all_distances(world, &probes, 2.0 * grid.spacing, ignored);
-    distances.mesh = distances.mesh.max(of_vertices) + moved;
-    distances.solid = distances.solid.max(measure::loose(&samples, &net, &positions, &triangles));
+    let far = [cut.far, std::mem::take(&mut samples.loose)].concat();
+    let from_mesh = measure::from_mesh(&samples, &net, &positions, &cut.triangles, &far);
+    // Crossings that are near enough were not looked at again.
+    let near = if samples.meetings.is_empty() { 0.0 } else { ignored };
+    let distances = Distances { mesh: cut.distance.max(of_vertices) + moved, solid: from_mesh.max(near) };
+    let triangles = cut.triangles;
     let mesh = Mesh { positions, triangles, ..Mesh::default() };
     let topology =
         check::check(&mesh).map_err(|what| Error::Mismatch(format!("the mesh made is not closed: {what}")))?;

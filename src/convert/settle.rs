@@ -48,8 +48,10 @@ pub struct Settled {
     pub position: DVec3,
     /// Unit normal there, or nearly.
     pub normal: DVec3,
-    /// The corner or edge that the piece runs to if that is beyond the cell.
-    pub beyond: Option<DVec3>,
+    /// 1 on a face, 2 on an edge, 3 in a corner.
+    pub rank: usize,
+    /// The corner or edge that the piece runs to if that is beyond the cell, and its rank.
+    pub beyond: Option<(DVec3, usize)>,
 }
 
 /// A piece on its way.
@@ -126,9 +128,9 @@ impl Work<'_> {
 
     fn end(&self, other: Option<Settled>) -> Settled {
         match other {
-            None => Settled { position: self.at, normal: self.normal(), beyond: None },
+            None => Settled { position: self.at, normal: self.normal(), rank: self.rank, beyond: None },
             Some(other) => {
-                let beyond = (self.state == State::Found && self.rank > 1).then_some(self.at);
+                let beyond = (self.state == State::Found && self.rank > 1).then_some((self.at, self.rank));
                 Settled { beyond, ..other }
             }
         }
@@ -224,12 +226,14 @@ fn within(world: &World<f64>, tracer: &mut Tracer, works: &[Work], spacing: f64)
             let away = (c.t - spacing).abs();
             let position = if choice.is_edge { choice.point } else { line.at(c.t) };
             if best.is_none() && work.piece.contains(position, 0.0) && (!choice.is_edge || away <= NEAR * spacing) {
-                best = Some(Settled { position, normal: choice.normal, beyond: None });
+                let rank = 1 + usize::from(choice.is_edge);
+                best = Some(Settled { position, normal: choice.normal, rank, beyond: None });
             }
         }
         let middle = || Settled {
             position: Qef::new(&work.piece.planes).middle,
             normal: mean_normal(&work.piece.planes),
+            rank: 1,
             beyond: None,
         };
         (!list.is_empty()).then(|| best.unwrap_or_else(middle))

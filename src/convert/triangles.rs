@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::check::area;
-use super::measure::{Distances, Probe, distances, from_triangle};
+use super::measure::{Probe, distances, from_triangle};
 use super::samples::{Meeting, Samples};
 use super::vertices::Vertex;
 use super::watch::Watch;
@@ -16,13 +16,26 @@ use crate::scene::world::World;
 const CHUNK: usize = 2048;
 /// Triangles whose area is below this share of a cell's face have none.
 const NO_AREA: f64 = 1e-9;
+/// Triangles that turn away more (see [`turned`]) are turned over.
+const OVER: f64 = 1.9;
 /// First step, in cells, of a vertex that makes a triangle without area.
 const NUDGE: f64 = 1e-4;
 /// Steps of such vertices before giving up; each is twice as long as the one before.
 const NUDGES: i32 = 8;
 
+/// What became of quadrilaterals.
+#[derive(Default)]
+pub struct Cut {
+    /// Two for each.
+    pub triangles: Vec<[u32; 3]>,
+    /// The largest distance from the surface of a triangle's middle or the middle of a diagonal.
+    pub distance: f64,
+    /// Crossings that are not near their own triangles.
+    pub far: Vec<DVec3>,
+}
+
 /// Cuts each quadrilateral along the diagonal whose middle is nearer to the surface: along an edge, not across it.
-/// Distances of the triangles' middles from the surface, and of the crossings from the triangles, are taken along.
+/// `enough`: distances that are not worth a second look.
 ///
 /// # Errors
 /// Those of `watch`.
@@ -33,7 +46,7 @@ pub fn cut(
     positions: &[DVec3],
     enough: f64,
     watch: &Watch<'_>,
-) -> Result<(Vec<[u32; 3]>, Distances)> {
+) -> Result<Cut> {
     let spacing = samples.grid.spacing;
     (watch.more)(net.quads.len().div_ceil(CHUNK) as u64);
     let chunk = |(quads, meetings): (&[[u32; 4]], &[Meeting])| {
@@ -41,13 +54,13 @@ pub fn cut(
         Ok(cut_some(world, quads, meetings, positions, spacing, enough))
     };
     let work = net.quads.par_chunks(CHUNK).zip(samples.meetings.par_chunks(CHUNK));
-    let chunks = work.map(chunk).collect::<Result<Vec<_>>>()?;
-    let (mut triangles, mut all) = (Vec::with_capacity(2 * net.quads.len()), Distances::default());
-    for (list, distances) in chunks {
-        triangles.extend(list);
-        all = all.max(distances);
+    let mut all = Cut::default();
+    for cut in work.map(chunk).collect::<Result<Vec<_>>>()? {
+        all.triangles.extend(cut.triangles);
+        all.distance = all.distance.max(cut.distance);
+        all.far.extend(cut.far);
     }
-    Ok((triangles, all))
+    Ok(all)
 }
 
 fn cut_some(
@@ -57,7 +70,7 @@ fn cut_some(
     positions: &[DVec3],
     spacing: f64,
     enough: f64,
-) -> (Vec<[u32; 3]>, Distances) {
+) -> Cut {
     let place = |i: u32| positions[i as usize];
     let mut middles = Vec::with_capacity(2 * quads.len());
     for (quad, Meeting { normal, .. }) in quads.iter().zip(meetings) {
@@ -65,7 +78,7 @@ fn cut_some(
         middles.extend([0.5 * (a + c), 0.5 * (b + d)].map(|point| Probe { point, normal: *normal }));
     }
     let of_middles = distances(world, &middles, 2.0 * spacing, enough);
-    let (mut triangles, mut found) = (Vec::with_capacity(2 * quads.len()), Distances::default());
+    let mut found = Cut::default();
     let mut inner = Vec::with_capacity(2 * quads.len());
     for ((quad, meeting), away) in quads.iter().zip(meetings).zip(of_middles.chunks_exact(2)) {
         let [a, b, c, d] = *quad;
@@ -75,20 +88,20 @@ fn cut_some(
             let flat = corners.iter().any(|t| area(*t) < NO_AREA * spacing * spacing);
             let turned = corners.iter().map(|t| turned(*t, meeting.normal)).fold(0.0, f64::max);
             // Distances within a hundredth of what is asked for are the same.
-            (flat, away[way].max(0.01 * enough), turned)
+            (flat, turned > OVER, away[way].max(0.01 * enough), turned)
         };
-        let (first, second) = (cost(0), cost(1));
-        let way = usize::from(second < first);
-        found.mesh = found.mesh.max(away[way]);
+        let way = usize::from(cost(1) < cost(0));
+        found.distance = found.distance.max(away[way]);
         let corners = ways[way].map(|t| t.map(place));
-        found.solid =
-            found.solid.max(from_triangle(meeting.point, corners[0]).min(from_triangle(meeting.point, corners[1])));
+        if corners.iter().all(|t| from_triangle(meeting.point, *t) > enough) {
+            found.far.push(meeting.point);
+        }
         inner.extend(corners.map(|[a, b, c]| Probe { point: (a + b + c) / 3.0, normal: meeting.normal }));
-        triangles.extend(ways[way]);
+        found.triangles.extend(ways[way]);
     }
     let of_inner = distances(world, &inner, 2.0 * spacing, enough);
-    found.mesh = of_inner.into_iter().fold(found.mesh, f64::max);
-    (triangles, found)
+    found.distance = of_inner.into_iter().fold(found.distance, f64::max);
+    found
 }
 
 /// How far a triangle's normal turns away: 0 if it is `normal`, 2 if it is the opposite.

@@ -1,6 +1,6 @@
 //! The vertices of a net.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,6 +16,9 @@ use crate::scene::world::World;
 /// Cells settled together.
 const CHUNK: usize = 2048;
 
+/// Share of the way back from an edge or a corner that is another vertex's.
+const BACK: f64 = 0.05;
+
 /// Where a vertex is.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertex {
@@ -25,8 +28,8 @@ pub struct Vertex {
     pub normal: DVec3,
 }
 
-/// Vertices on the surface, on its edges and corners where the cell has some. A corner or edge that ends in a cell
-/// which no edge of the grid tells of is taken by the nearest cell whose planes lead there.
+/// Vertices on the surface, on its edges and corners where the cell has some. See [`moves`] for those that the edges
+/// of their cells do not tell of.
 ///
 /// # Errors
 /// Those of `watch`.
@@ -40,11 +43,21 @@ pub fn settled(world: &World<f64>, samples: &Samples, net: &Net, watch: &Watch<'
     };
     let chunks = net.cells.par_chunks(CHUNK).map(chunk).collect::<Result<Vec<_>>>()?;
     let settled = chunks.concat();
-    let mut vertices: Vec<Vertex> = settled.iter().map(|s| Vertex { position: s.position, normal: s.normal }).collect();
-    for (vertex, position) in claims(samples, net, &settled) {
+    let mut vertices: Vec<Vertex> = settled.iter().map(Settled::near).collect();
+    for (vertex, position) in moves(samples, net, &settled) {
         vertices[vertex].position = position;
     }
     Ok(vertices)
+}
+
+impl Settled {
+    /// The vertex in its cell or, where the piece runs to an edge or a corner beyond, nearly there: all faces that the
+    /// cell sees meet only there. On the way back to the cell, which is on one of these faces, so that it shares its
+    /// place with no other vertex.
+    fn near(&self) -> Vertex {
+        let far = self.beyond.map_or(self.position, |(far, _)| far + BACK * (self.position - far));
+        Vertex { position: far, normal: self.normal }
+    }
 }
 
 fn piece(samples: &Samples, cell: &Cell, number: u8) -> Piece {
@@ -53,20 +66,37 @@ fn piece(samples: &Samples, cell: &Cell, number: u8) -> Piece {
     Piece { planes: planes.collect(), lo: samples.grid.position(at), hi: samples.grid.position(at.map(|n| n + 1)) }
 }
 
-/// Which vertices go beyond their cells: one for each cell without a vertex of its own, the one that has least to go.
-fn claims(samples: &Samples, net: &Net, settled: &[Settled]) -> Vec<(usize, DVec3)> {
+/// Corners and edges found beyond the cells whose planes lead there. In a cell that has vertices the nearest of them
+/// moves there unless it is on as much already; in one that has none, of the vertices that found it the one with
+/// the least way.
+fn moves(samples: &Samples, net: &Net, settled: &[Settled]) -> HashMap<usize, DVec3> {
     let grid = &samples.grid;
-    let mut best: HashMap<u64, (f64, usize, DVec3)> = HashMap::new();
+    // For each cell the best found: corners before edges, then the nearest to who found it.
+    let mut best: BTreeMap<u64, (usize, f64, usize, DVec3)> = BTreeMap::new();
     for (vertex, s) in settled.iter().enumerate() {
-        let Some(position) = s.beyond else { continue };
+        let Some((position, rank)) = s.beyond else { continue };
         let Some(at) = grid.cell_at(position) else { continue };
-        let cell = grid.corner(at);
         let far = position.distance(s.position);
-        if net.cell(cell).is_none() && best.get(&cell).is_none_or(|b| far < b.0) {
-            best.insert(cell, (far, vertex, position));
+        let entry = best.entry(grid.corner(at)).or_insert((rank, far, vertex, position));
+        if rank > entry.0 || rank == entry.0 && far < entry.1 {
+            *entry = (rank, far, vertex, position);
         }
     }
-    best.into_values().map(|(_, vertex, position)| (vertex, position)).collect()
+    let mut moves = HashMap::new();
+    for (&corner, &(rank, _, _, position)) in &best {
+        let Some(cell) = net.cell(corner) else { continue };
+        let own = (cell.first..cell.first + u32::from(cell.count)).map(|v| v as usize);
+        let far = |v: &usize| settled[*v].position.distance(position);
+        if let Some(vertex) = own.min_by(|a, b| far(a).total_cmp(&far(b))).filter(|v| settled[*v].rank < rank) {
+            moves.insert(vertex, position);
+        }
+    }
+    for (&corner, &(_, _, vertex, position)) in &best {
+        if net.cell(corner).is_none() {
+            moves.entry(vertex).or_insert(position);
+        }
+    }
+    moves
 }
 
 /// Vertices in the middles of their cells: with samples at the middles of voxels, the voxels' corners.

@@ -91,7 +91,7 @@ impl Voxels {
             format!("{} faces of voxels need", meetings.len())
         })?;
         let samples = Samples { grid: self.grid, rows: self.rows, meetings, loose: Vec::new() };
-        let net = Net::new(&samples);
+        let net = Net::new(&samples, None);
         let positions = snap(&in_the_middle(&samples, &net)).map_err(Error::Usage)?;
         let triangles = net.quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
         let mesh = Mesh { positions, triangles, ..Mesh::default() };

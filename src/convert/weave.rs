@@ -1,15 +1,20 @@
 //! From samples to a closed, manifold net.
 //!
 //! Every loop of every cell (see [`super::cell`]) gets a vertex, every crossed edge of the grid a quadrilateral
-//! between the four cells around it. Such a mesh is a manifold unless two cells share a face on which one and the
+//! between the four cells around it. A face with two inside corners across from each other connects them if a ray
+//! from one to the other stays inside. Such a mesh is a manifold unless two cells share a face on which one and the
 //! same loop of both passes twice; then the face is joined the other way, which parts the loop in both (the idea of
 //! R. Wenger, "Isosurfaces: Geometry, Topology, and Algorithms", 2013, section 3.5). Loops are only ever parted, so
 //! one pass is enough.
 
 use std::collections::HashSet;
 
-use super::cell::{NONE, face_pairs, is_ambiguous, loops, lower_corner};
+use glam::DVec3;
+
+use super::cell::{NONE, face_corners, face_pairs, is_ambiguous, loops, lower_corner};
+use super::lines::{Line, Tracer};
 use super::samples::{Meeting, Samples};
+use crate::scene::world::World;
 
 /// A cell that the surface passes.
 #[derive(Clone, Copy, Debug)]
@@ -38,10 +43,10 @@ pub struct Net {
 }
 
 impl Net {
-    /// The net of `samples`.
-    pub fn new(samples: &Samples) -> Self {
+    /// The net of `samples`. Without a world no face connects its inside corners if it need not.
+    pub fn new(samples: &Samples, world: Option<&World<f64>>) -> Self {
         let mut cells = active(samples);
-        part(samples, &mut cells);
+        part(samples, world, &mut cells);
         let mut vertices = 0;
         for cell in &mut cells {
             cell.first = vertices;
@@ -112,41 +117,69 @@ fn find(cells: &[Cell], corner: u64) -> Option<usize> {
     cells.binary_search_by_key(&corner, |cell| cell.corner).ok()
 }
 
-/// Parts loops that meet another loop twice.
-fn part(samples: &Samples, cells: &mut [Cell]) {
+/// Faces, by the number of the corner of the cell above them and their axis.
+type Faces = HashSet<(u64, usize)>;
+
+/// Joins the loops of all cells and parts those that meet another loop twice.
+fn part(samples: &Samples, world: Option<&World<f64>>, cells: &mut [Cell]) {
     let grid = &samples.grid;
-    // Faces by the number of the upper cell's corner and their axis.
-    let mut connecting: HashSet<(u64, usize)> = HashSet::new();
-    let relabelled = |cell: &Cell, connecting: &HashSet<(u64, usize)>| {
+    let mut ambiguous = Vec::new();
+    for (i, cell) in cells.iter().enumerate() {
+        for axis in (0..3).filter(|axis| is_ambiguous(cell.inside, 2 * axis)) {
+            let mut below = grid.corner_at(cell.corner);
+            // The outermost corners are outside, so an ambiguous face has a cell below.
+            below[axis] = below[axis].saturating_sub(1);
+            ambiguous.extend(find(cells, grid.corner(below)).map(|j| (i, j, axis)));
+        }
+    }
+    let mut connecting = world.map_or_else(Faces::new, |world| connected(samples, world, cells, &ambiguous));
+    let join = |cell: &mut Cell, connecting: &Faces| {
         let at = grid.corner_at(cell.corner);
         let connects = (0..6).filter(|&face| {
             let mut upper = at;
             upper[face / 2] += face % 2;
             connecting.contains(&(grid.corner(upper), face / 2))
         });
-        loops(cell.inside, connects.fold(0, |bits, face| bits | 1 << face))
+        (cell.loops, cell.count) = loops(cell.inside, connects.fold(0, |bits, face| bits | 1 << face));
     };
-    for i in 0..cells.len() {
-        for axis in 0..3 {
-            let (face, cell) = (2 * axis, cells[i]);
-            let mut below = grid.corner_at(cell.corner);
-            if !is_ambiguous(cell.inside, face) || below[axis] == 0 {
-                continue;
+    for &(i, j, _) in &ambiguous {
+        join(&mut cells[i], &connecting);
+        join(&mut cells[j], &connecting);
+    }
+    for &(i, j, axis) in &ambiguous {
+        let face = (cells[i].corner, axis);
+        let twice = |cell: &Cell, side: usize| {
+            let [[a, _], [b, _]] = face_pairs(cell.inside, 2 * axis + side, connecting.contains(&face));
+            cell.loops[a] == cell.loops[b]
+        };
+        if twice(&cells[i], 0) && twice(&cells[j], 1) {
+            if !connecting.remove(&face) {
+                connecting.insert(face);
             }
-            below[axis] -= 1;
-            let Some(j) = find(cells, grid.corner(below)) else { continue };
-            let twice = |cell: &Cell, face: usize| {
-                let [[a, _], [b, _]] = face_pairs(cell.inside, face, false);
-                cell.loops[a] == cell.loops[b]
-            };
-            if twice(&cell, face) && twice(&cells[j], face + 1) {
-                connecting.insert((cell.corner, axis));
-                for k in [i, j] {
-                    (cells[k].loops, cells[k].count) = relabelled(&cells[k], &connecting);
-                }
-            }
+            join(&mut cells[i], &connecting);
+            join(&mut cells[j], &connecting);
         }
     }
+}
+
+/// The ambiguous faces, lower ones of their first cells, whose inside corners see each other through the inside.
+fn connected(samples: &Samples, world: &World<f64>, cells: &[Cell], ambiguous: &[(usize, usize, usize)]) -> Faces {
+    let line = |&(i, _, axis): &(usize, usize, usize)| {
+        let at = samples.grid.corner_at(cells[i].corner);
+        let ends = face_corners(2 * axis).into_iter().filter(|c| cells[i].inside >> c & 1 != 0);
+        let mut ends = ends.map(|c| samples.grid.position([at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2)]));
+        let (from, to) = (ends.next().unwrap_or_default(), ends.next().unwrap_or_default());
+        Line { org: from, dir: (to - from).normalize_or(DVec3::Z), length: from.distance(to) }
+    };
+    let lines: Vec<Line> = ambiguous.iter().map(line).collect();
+    let mut faces = Faces::new();
+    Tracer::default().each(world, &lines, |n, found| {
+        let (i, _, axis) = ambiguous[n];
+        if found.is_empty() {
+            faces.insert((cells[i].corner, axis));
+        }
+    });
+    faces
 }
 
 /// The quadrilateral of a crossed edge.
