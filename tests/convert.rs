@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use common::Random;
 use glam::{DAffine3, DQuat, DVec3};
-use lanecast::convert::measure::from_triangle;
+use lanecast::convert::nearby::from_triangle;
 use lanecast::convert::{Fineness, Solids, Surface, Voxels, Watch, surface};
 use lanecast::reference::Oracle;
 use lanecast::scene::description::{Description, ItemKind, Shape};
@@ -67,18 +67,24 @@ fn one_fan_each(mesh: &Mesh, after: &HashMap<(u32, u32), u32>, what: &str) {
     }
 }
 
-/// Least distance from the solid's surface along some lines through a point, by the oracle.
+/// Least distance from the solid's surface along some lines through a point, or just beside it, by the oracle.
 fn distance(oracle: &Oracle, point: DVec3, reach: f64) -> f64 {
     let ways = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE, DVec3::new(1.0, -1.0, 1.0), DVec3::new(-1.0, 1.0, 1.0)];
+    let beside = 1e-3 * reach;
+    let steps = [DVec3::ZERO, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
     let mut least = reach;
-    for way in ways.into_iter().map(DVec3::normalize).chain([DVec3::new(1.0, 1.0, -1.0).normalize()]) {
-        for dir in [way, -way] {
+    for step in steps {
+        for dir in ways.map(DVec3::normalize).into_iter().flat_map(|way| [way, -way]) {
             let mut from = 0.0;
             // Every boundary on the way, one after the other.
-            while let Some(hit) = oracle.closest(point - dir * reach, dir, from, 2.0 * reach) {
-                least = least.min((hit.t - reach).abs());
+            while let Some(hit) = oracle.closest(point + step * beside - dir * reach, dir, from, 2.0 * reach) {
+                least = least.min((hit.t - reach).abs() + beside * step.length());
                 from = hit.t + 1e-3 * reach;
             }
+        }
+        // What a ray just misses, the next one meets.
+        if least < 0.1 * reach {
+            break;
         }
     }
     least

@@ -19,11 +19,13 @@
 pub mod check;
 pub mod grid;
 pub mod measure;
+pub mod nearby;
 pub mod select;
 pub mod voxels;
 pub mod watch;
 
 mod cell;
+mod islands;
 mod lines;
 mod qef;
 mod rows;
@@ -35,6 +37,7 @@ mod vertices;
 mod weave;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 pub use check::Topology;
 pub use grid::Grid;
@@ -45,6 +48,7 @@ pub use watch::Watch;
 
 use crate::error::{Error, Result};
 use crate::scene::mesh::Mesh;
+use nearby::Nearby;
 use rows::Rows;
 use samples::Samples;
 use weave::Net;
@@ -121,7 +125,7 @@ fn on_grid(
         afford(bytes, fineness, || need(&grid, bytes, fineness, before))
     };
     enough(0)?;
-    let mut samples = Samples::new(world, grid, &enough, watch)?;
+    let samples = Samples::new(world, grid, &enough, watch)?;
     let net = Net::new(&samples, Some(world));
     let mut vertices = vertices::settled(world, &samples, &net, watch)?;
     let mut positions = snap::snap(&vertices).map_err(Error::Usage)?;
@@ -132,13 +136,19 @@ fn on_grid(
     let probes: Vec<_> =
         vertices.iter().zip(&positions).map(|(v, p)| measure::Probe { point: *p, normal: v.normal }).collect();
     let of_vertices = measure::all_distances(world, &probes, 2.0 * grid.spacing, ignored);
-    let far = [cut.far, std::mem::take(&mut samples.loose)].concat();
-    let from_mesh = measure::from_mesh(&samples, &net, &positions, &cut.triangles, &far);
+    let nearby = Nearby::new(&grid, &net, &positions, &cut.triangles);
+    let crossing = |quad: usize| samples.meetings[quad].point;
+    let left_out = islands::islands(&nearby, crossing, fineness.tolerance);
+    let of_islands = (0..net.quads.len()).filter(|&quad| left_out[2 * quad]).map(crossing);
+    let far: Vec<DVec3> = cut.far.iter().chain(&samples.loose).copied().chain(of_islands).collect();
+    let away = |point: &DVec3| nearby.distance(*point, |triangle| !left_out[triangle as usize]);
     // Crossings that are near enough were not looked at again.
     let near = if samples.meetings.is_empty() { 0.0 } else { ignored };
-    let distances = Distances { mesh: cut.distance.max(of_vertices) + moved, solid: from_mesh.max(near) };
-    let triangles = cut.triangles;
-    let mesh = Mesh { positions, triangles, ..Mesh::default() };
+    let distances = Distances {
+        mesh: cut.distance.max(of_vertices) + moved,
+        solid: far.par_iter().map(away).reduce(|| near, f64::max),
+    };
+    let mesh = islands::without(&nearby, &left_out);
     let topology =
         check::check(&mesh).map_err(|what| Error::Mismatch(format!("the mesh made is not closed: {what}")))?;
     Ok(Surface { mesh, grid, distances, topology })

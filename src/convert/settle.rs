@@ -23,6 +23,8 @@ const TRIES: usize = 3;
 const ON: f64 = 1e-3;
 /// The same for an edge that two of several faces make, whose tangents may have been taken a cell away.
 const NEAR: f64 = 0.05;
+/// Shares of a cell within which a face that was not seen may be the one that is missing.
+const CLOSE: f64 = 0.5;
 /// Cosine of the angle within which normals are of one face.
 const SAME_FACE: f64 = 0.94;
 /// Cosine beyond which a crossing is of another face than the one looked for.
@@ -63,6 +65,8 @@ struct Work<'a> {
     seen: Vec<Plane>,
     at: DVec3,
     rank: usize,
+    /// Whether the last look saw all faces, and all of them meet here.
+    sure: bool,
     state: State,
 }
 
@@ -83,6 +87,7 @@ pub fn settle(world: &World<f64>, pieces: &[Piece], spacing: f64) -> Vec<Settled
         seen: Vec::new(),
         at: DVec3::ZERO,
         rank: 1,
+        sure: false,
         state: State::Open,
     };
     let mut works: Vec<Work> = pieces.iter().map(start).collect();
@@ -166,10 +171,12 @@ fn look_nearer(world: &World<f64>, tracer: &mut Tracer, works: &mut [Work], spac
                 again.push(Plane { point: line.at(c.t), normal: c.normal });
             }
         }
+        work.sure = again.len() == work.seen.len();
         if !again.is_empty() {
             work.seen = again;
             work.guess(spacing);
         }
+        work.sure &= work.seen.iter().all(|p| p.normal.dot(work.at - p.point).abs() <= ON * spacing);
     }
 }
 
@@ -206,6 +213,10 @@ fn look_for_faces(world: &World<f64>, tracer: &mut Tracer, works: &mut [Work], s
             }
         }
         match best {
+            // Where two solids touch, a ray through the edge they share passes from one into the other.
+            _ if work.sure && best.is_none_or(|(old, away, _)| old || away > CLOSE * spacing) => {
+                work.state = State::Found;
+            }
             Some((_, _, plane)) => work.known.push(plane),
             None => work.state = State::Lost,
         }

@@ -4,7 +4,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::check::area;
-use super::measure::{Probe, distances, from_triangle};
+use super::measure::{Probe, distances};
+use super::nearby::from_triangle;
 use super::samples::{Meeting, Samples};
 use super::vertices::Vertex;
 use super::watch::Watch;
