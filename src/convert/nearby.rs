@@ -5,10 +5,11 @@ use std::collections::HashSet;
 use glam::DVec3;
 
 use super::grid::Grid;
+use super::settle::REACH;
 use super::weave::Net;
 
-/// Cells around a point in which the nearest triangle is looked for: vertices are at most one beyond their own.
-const AROUND: usize = 2;
+/// Cells around a point in which the nearest triangle is looked for: one more than vertices may be beyond their own.
+const AROUND: usize = REACH as usize + 1;
 
 /// The triangles of a net, by their cells.
 pub struct Nearby<'a> {
@@ -40,7 +41,7 @@ impl<'a> Nearby<'a> {
         Self { positions, triangles, grid, net, starts, of }
     }
 
-    /// Distance of a point from the nearest triangle that counts; two cells if there is none near.
+    /// Distance of a point from the nearest triangle that counts; a few cells if there is none near.
     pub fn distance(&self, point: DVec3, counts: impl Fn(u32) -> bool) -> f64 {
         let Some(at) = self.grid.cell_at(point) else { return 0.0 };
         let mut list = HashSet::new();

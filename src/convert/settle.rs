@@ -27,6 +27,8 @@ const NEAR: f64 = 0.05;
 const CLOSE: f64 = 0.5;
 /// Cosine of the angle within which normals are of one face.
 const SAME_FACE: f64 = 0.94;
+/// Cells beyond its own that a vertex may go.
+pub const REACH: f64 = 2.0;
 /// Cosine beyond which a crossing is of another face than the one looked for.
 const TURNED: f64 = 0.3;
 /// Points this much outside of a cell, in its edges, count as inside.
@@ -117,14 +119,15 @@ impl Work<'_> {
         }
     }
 
-    /// The point that the planes seen fix, not more than a cell beyond the cell.
+    /// The point that the planes seen fix, not too far beyond the cell.
     fn guess(&mut self, spacing: f64) {
+        let beyond = REACH * spacing;
         let qef = Qef::new(&self.seen);
         self.rank = qef.rank();
-        while self.rank > 1 && !self.piece.contains(qef.point(self.rank), spacing) {
+        while self.rank > 1 && !self.piece.contains(qef.point(self.rank), beyond) {
             self.rank -= 1;
         }
-        self.at = qef.point(self.rank).clamp(self.piece.lo - spacing, self.piece.hi + spacing);
+        self.at = qef.point(self.rank).clamp(self.piece.lo - beyond, self.piece.hi + beyond);
     }
 
     fn normal(&self) -> DVec3 {
