@@ -59,7 +59,8 @@ pub fn check(mesh: &Mesh) -> Result<Topology, String> {
         return Err("two vertices are at one place".into());
     }
     let euler = count as i64 - edges.len() as i64 / 2 + mesh.triangles.len() as i64;
-    Ok(Topology { euler, shells: shells(mesh) })
+    let shells = (0..).zip(roots(&mesh.triangles, count)).filter(|(v, root)| v == root).count();
+    Ok(Topology { euler, shells })
 }
 
 /// Twice the area of a triangle.
@@ -67,23 +68,23 @@ pub fn area([a, b, c]: [DVec3; 3]) -> f64 {
     (b - a).cross(c - a).length()
 }
 
-/// Number of connected surfaces, by union and find.
-fn shells(mesh: &Mesh) -> usize {
-    let mut root: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    let find = |root: &mut Vec<u32>, mut v: u32| {
+/// The first vertex of each vertex's connected surface, by union and find. `count` is the number of vertices.
+pub fn roots(triangles: &[[u32; 3]], count: usize) -> Vec<u32> {
+    let mut root: Vec<u32> = (0..count as u32).collect();
+    let find = |root: &mut [u32], mut v: u32| {
         while root[v as usize] != v {
             root[v as usize] = root[root[v as usize] as usize];
             v = root[v as usize];
         }
         v
     };
-    for &[a, b, c] in &mesh.triangles {
+    for &[a, b, c] in triangles {
         for other in [b, c] {
             let (p, q) = (find(&mut root, a), find(&mut root, other));
             root[p.max(q) as usize] = p.min(q);
         }
     }
-    (0..).zip(&root).filter(|(v, r)| v == *r).count()
+    (0..count as u32).map(|v| find(&mut root, v)).collect()
 }
 
 #[cfg(test)]

@@ -6,20 +6,24 @@
 
 use glam::DVec3;
 
+use super::check::roots;
 use super::nearby::Nearby;
 use crate::scene::mesh::Mesh;
 
 /// Triangles of the largest island.
 const LARGEST: usize = 96;
 
-/// Which triangles are on islands: of a surface of few triangles whose crossings, that of triangle `i` is `crossing(i / 2)`,
-/// are all within `enough` of larger surfaces.
+/// Which triangles are on islands: surfaces of few triangles whose crossings are all within `enough` of larger ones.
+/// The crossing of triangle `i` is `crossing(i / 2)`. The largest surface is none.
 pub fn islands(mesh: &Nearby<'_>, crossing: impl Fn(usize) -> DVec3, enough: f64) -> Vec<bool> {
-    let roots = roots(mesh);
+    let roots = roots(mesh.triangles, mesh.positions.len());
     let of = |i: usize| roots[mesh.triangles[i][0] as usize] as usize;
     let mut sizes = vec![0usize; mesh.positions.len()];
     (0..mesh.triangles.len()).for_each(|i| sizes[of(i)] += 1);
     let mut is_island: Vec<bool> = sizes.iter().map(|&size| size > 0 && size <= LARGEST).collect();
+    if let Some(largest) = (0..sizes.len()).max_by_key(|&root| sizes[root]) {
+        is_island[largest] = false;
+    }
     if !is_island.contains(&true) {
         return vec![false; mesh.triangles.len()];
     }
@@ -28,25 +32,6 @@ pub fn islands(mesh: &Nearby<'_>, crossing: impl Fn(usize) -> DVec3, enough: f64
         is_island[of(i)] &= mesh.distance(crossing(i / 2), |other| !small[of(other as usize)]) <= enough;
     }
     (0..mesh.triangles.len()).map(|i| is_island[of(i)]).collect()
-}
-
-/// The first vertex of each vertex's surface, by union and find.
-fn roots(mesh: &Nearby<'_>) -> Vec<u32> {
-    let mut root: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    let find = |root: &mut [u32], mut v: u32| {
-        while root[v as usize] != v {
-            root[v as usize] = root[root[v as usize] as usize];
-            v = root[v as usize];
-        }
-        v
-    };
-    for &[a, b, c] in mesh.triangles {
-        for other in [b, c] {
-            let (p, q) = (find(&mut root, a), find(&mut root, other));
-            root[p.max(q) as usize] = p.min(q);
-        }
-    }
-    (0..root.len() as u32).map(|v| find(&mut root, v)).collect()
 }
 
 /// The mesh without the triangles that are left out.

@@ -97,41 +97,43 @@ pub fn surface(solids: &Solids, fineness: &Fineness, watch: &Watch<'_>) -> Resul
     let side = (solids.hi - solids.lo).max_element();
     let first = (side / (CELL * fineness.tolerance)).clamp(FIRST.0, FIRST.1);
     let mut count = fineness.cells.map_or(first, f64::from);
-    let mut before = None;
+    let grid_of = |count: f64| Grid::around(solids.lo, solids.hi, side / count, SHIFT);
+    // Cells along the longest side, edges crossed, distance reached: of a grid that tells what a finer one needs.
+    let mut known = None;
+    if count > FIRST.1 {
+        let coarse = Samples::new(&solids.world, grid_of(FIRST.1)?, &|_| Ok(()), watch)?;
+        known = Some((FIRST.1, coarse.meetings.len(), None));
+    }
     loop {
-        let grid = Grid::around(solids.lo, solids.hi, side / count, SHIFT)?;
-        let found = on_grid(solids, grid, fineness, before, watch)?;
+        let grid = grid_of(count)?;
+        let least = Rows::least_bytes(&grid);
+        let enough = |crossed: u64| {
+            let bytes = least + crossed * BYTES_PER_MEETING;
+            let reached = known.and_then(|(_, _, reached)| reached);
+            afford(bytes, fineness, || need(&grid, bytes, fineness, reached))
+        };
+        // A surface crosses four times as many edges of cells half as large.
+        enough(known.map_or(0, |(cells, crossed, _)| (crossed as f64 * (count / cells).powi(2)) as u64))?;
+        let samples = Samples::new(&solids.world, grid, &enough, watch)?;
+        let found = on_grid(solids, &samples, fineness, watch)?;
         let is_last = fineness.cells.is_some() || grid.spacing <= LAST * fineness.tolerance;
         if is_last || found.distances.largest() <= fineness.tolerance {
             return Ok(found);
         }
-        before = Some(found.distances.largest());
+        known = Some((count, samples.meetings.len(), Some(found.distances.largest())));
         count *= 2.0;
     }
 }
 
-/// The surface on one grid. `before`: the distance that the grid before reached.
-fn on_grid(
-    solids: &Solids,
-    grid: Grid,
-    fineness: &Fineness,
-    before: Option<f64>,
-    watch: &Watch<'_>,
-) -> Result<Surface> {
-    let world = &solids.world;
-    let least = Rows::least_bytes(&grid);
-    let enough = |crossed: u64| {
-        let bytes = least + crossed * BYTES_PER_MEETING;
-        afford(bytes, fineness, || need(&grid, bytes, fineness, before))
-    };
-    enough(0)?;
-    let samples = Samples::new(world, grid, &enough, watch)?;
-    let net = Net::new(&samples, Some(world));
-    let mut vertices = vertices::settled(world, &samples, &net, watch)?;
+/// The surface on one grid.
+fn on_grid(solids: &Solids, samples: &Samples, fineness: &Fineness, watch: &Watch<'_>) -> Result<Surface> {
+    let (world, grid) = (&solids.world, samples.grid);
+    let net = Net::new(samples, Some(world));
+    let mut vertices = vertices::settled(world, samples, &net, watch)?;
     let mut positions = snap::snap(&vertices).map_err(Error::Usage)?;
     // Nearer than this nobody asks.
     let ignored = 0.5 * fineness.tolerance;
-    let cut = triangles::cut(world, &samples, &net, &positions, ignored, watch)?;
+    let cut = triangles::cut(world, samples, &net, &positions, ignored, watch)?;
     let moved = triangles::mend(&mut vertices, &cut.triangles, &mut positions, grid.spacing);
     let probes: Vec<_> =
         vertices.iter().zip(&positions).map(|(v, p)| measure::Probe { point: *p, normal: v.normal }).collect();
@@ -155,11 +157,11 @@ fn on_grid(
 }
 
 /// What a grid that needs `bytes` is, and what would fit.
-fn need(grid: &Grid, bytes: u64, fineness: &Fineness, before: Option<f64>) -> String {
+fn need(grid: &Grid, bytes: u64, fineness: &Fineness, reached: Option<f64>) -> String {
     let [x, y, z] = grid.cells;
     let longest = x.max(y).max(z) as f64;
     let share = (bytes as f64 / fineness.memory.max(1) as f64).sqrt() * 1.1;
-    let fits = match (before, fineness.cells) {
+    let fits = match (reached, fineness.cells) {
         (_, Some(_)) => format!("--cells {}", (longest / share) as u64),
         (Some(reached), None) => format!("--tolerance {:.2e}", reached * 1.01),
         (None, None) => format!("--tolerance {:.2e}", grid.spacing * share / CELL),

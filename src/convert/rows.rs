@@ -6,6 +6,9 @@ use std::ops::Range;
 use super::grid::Grid;
 use super::lines::Crossing;
 
+/// Bytes of a row while it is made.
+const BYTES_PER_ROW: u64 = 64;
+
 /// Changes along x of every row of corners. A row begins and ends outside.
 #[derive(Debug)]
 pub struct Rows {
@@ -30,7 +33,7 @@ impl Rows {
     /// Bytes of the rows of `grid` before anything is known of the surface.
     pub fn least_bytes(grid: &Grid) -> u64 {
         let [_, ny, nz] = grid.corners().map(|n| n as u64);
-        ny * nz * size_of::<usize>() as u64
+        ny * nz * BYTES_PER_ROW
     }
 
     /// From the changes of all rows, y first, then z.

@@ -4,6 +4,8 @@
 //! its line that turns the right way and is nearest to the edge. So the surface is closed, whatever rounding says
 //! about lines that graze it. Planes of lines are traced one by one; nothing is kept but what the surface needs.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -50,14 +52,26 @@ struct Sheet {
 }
 
 impl Samples {
-    /// Traces all lines of `grid`. `afford` is told how many edges are crossed before they are kept.
+    /// Traces all lines of `grid`. `afford` is told how many crossed edges are known of, more and more.
     ///
     /// # Errors
     /// Those of `afford` and `watch`.
-    pub fn new(world: &World<f64>, grid: Grid, afford: &dyn Fn(u64) -> Result<()>, watch: &Watch<'_>) -> Result<Self> {
+    pub fn new(
+        world: &World<f64>,
+        grid: Grid,
+        afford: &(dyn Fn(u64) -> Result<()> + Sync),
+        watch: &Watch<'_>,
+    ) -> Result<Self> {
         let [_, ny, nz] = grid.corners();
         (watch.more)((2 * nz + ny) as u64);
-        let along_x = |z| watch.next().map(|()| sheet_x(world, &grid, z));
+        let known = AtomicU64::new(0);
+        let along_x = |z| {
+            watch.next()?;
+            let sheet = sheet_x(world, &grid, z);
+            let count = sheet.meetings.len() as u64;
+            afford(known.fetch_add(count, Ordering::Relaxed) + count)?;
+            Ok(sheet)
+        };
         let mut sheets = (0..nz).into_par_iter().map(along_x).collect::<Result<Vec<_>>>()?;
         let rows = Rows::new(&grid, sheets.iter().flat_map(|s| s.rows.iter().map(Vec::as_slice)));
         let along_x: usize = sheets.iter().map(|s| s.meetings.len()).sum();

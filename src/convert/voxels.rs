@@ -49,13 +49,11 @@ impl Voxels {
         let grid = Grid::new(origin - spacing, spacing, counts + 1.0)?;
         let size = grid.cells.map(|n| n - 1);
         afford(grid.corner_count() + Rows::least_bytes(&grid), fineness, || {
-            let most = (fineness.memory as f64 / 1.1).cbrt();
-            format!("{} x {} x {} voxels need", size[0], size[1], size[2])
-                + &format!(
-                    " (--voxels {} or --tolerance {:.1e} fits)",
-                    most as u64,
-                    tolerance_of((solids.hi - solids.lo).max_element() / most)
-                )
+            // As many as fit a cube, whatever the box.
+            let most = (fineness.memory as f64 / 2.0).cbrt().floor();
+            let tolerance = tolerance_of((solids.hi - solids.lo).max_element() / most);
+            let [x, y, z] = size;
+            format!("{x} x {y} x {z} voxels (--voxels {most} or --tolerance {tolerance:.2e} fits) need")
         })?;
         let rows = rows_of(&solids.world, &grid, watch)?;
         Ok(Self { origin, spacing, size, grid, rows })
