@@ -136,7 +136,7 @@ fn closed_forms() {
     let hole = |x: f64| solids::cylinder(DVec3::new(x, 0.0, -1.0), DVec3::new(x, 0.0, 1.0), 0.3).unwrap();
     let plate = vec![cuboid(DVec3::new(-2.0, -0.6, -0.1), DVec3::new(2.0, 0.6, 0.1)), hole(-1.2), hole(0.1), hole(1.2)];
     // A ball that leaves the cube's twelve edges; caps of it lie outside.
-    let (r, h) = (1.2, 0.2);
+    let (r, h) = (1.2f64, 0.2);
     let frame = 8.0 - (4.0 / 3.0 * PI * r * r * r - 6.0 * PI * h * h * (3.0 * r - h) / 3.0);
     let frame_area = 24.0 - 6.0 * PI * (r * r - 1.0) + 4.0 * PI * r * r - 12.0 * PI * r * h;
     let ball = |r| solids::ball(DVec3::ZERO, r).unwrap();
@@ -144,6 +144,7 @@ fn closed_forms() {
         ("ball", one(ball(1.0)), 4.0 / 3.0 * PI, 4.0 * PI, 2),
         ("cube", one(cube()), 8.0, 24.0, 2),
         ("turned cube", one(turned(cube())), 8.0, 24.0, 2),
+        ("sheet", one(turned(cuboid(DVec3::new(-1.0, -1.0, -0.01), DVec3::new(1.0, 1.0, 0.01)))), 0.08, 8.16, 2),
         ("cylinder", one(turned(solids::cylinder(-z, z, 0.8).unwrap())), 1.28 * PI, 4.48 * PI, 2),
         ("cone", one(turned(solids::cone(DVec3::ZERO, z, 1.0, 0.0).unwrap())), PI / 3.0, cone, 2),
         ("torus", one(turned(solids::torus(DVec3::ZERO, z, 1.0, 0.3).unwrap())), 0.18 * PI * PI, 1.2 * PI * PI, 0),
@@ -186,20 +187,12 @@ fn cubes_keep_their_corners_and_edges() {
         let transform = DAffine3::from_rotation_translation(turn, r.in_cube());
         let to_local = transform.inverse();
         let cube = Placed { transform, ..cuboid(DVec3::splat(-1.0), DVec3::ONE) };
-        let found = converted(&one(cube), 0.1, Some(10 + number % 9));
-        let mesh = found.mesh;
+        let mesh = converted(&one(cube), 0.1, Some(10 + number % 9)).mesh;
         manifold(&mesh, "cube");
         let local: Vec<DVec3> = mesh.positions.iter().map(|p| to_local.transform_point3(*p)).collect();
-        for corner in 0..8 {
-            let corner =
-                DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2)) * 2.0 - 1.0;
+        for corner in (0..8).map(|i: u8| DVec3::from_array([i & 1, i >> 1 & 1, i >> 2].map(f64::from)) * 2.0 - 1.0) {
             let least = local.iter().map(|p| p.distance(corner)).fold(f64::INFINITY, f64::min);
-            assert!(
-                least < 1e-6,
-                "cube {number}: at {:.3} h {} corner {corner} is {least} away",
-                transform.transform_point3(corner),
-                found.grid.spacing
-            );
+            assert!(least < 1e-6, "cube {number}: corner {corner} is {least} away");
         }
         for p in &local {
             let out = p.abs().max_element() - 1.0;
@@ -233,17 +226,22 @@ fn random_trees_give_manifolds() {
     }
 }
 
+/// Every second cube of 27.
+fn lattice() -> Vec<Placed> {
+    let cubes = (0..27).map(|i| [i % 3, i / 3 % 3, i / 9]).filter(|c| c.iter().sum::<i32>() % 2 == 0);
+    cubes.map(|c| DVec3::from_array(c.map(f64::from))).map(|lo| cuboid(lo, lo + 1.0)).collect()
+}
+
 /// Solids that no manifold has the shape of: their vertices are doubled.
 #[test]
 fn solids_that_touch() {
     let cube = |at: [f64; 3]| cuboid(DVec3::from_array(at), DVec3::from_array(at) + 1.0);
-    let lattice = (0..27).map(|i| [i % 3, i / 3 % 3, i / 9]).filter(|c| c.iter().sum::<i32>() % 2 == 0);
     let ball = solids::ball(DVec3::new(0.5, 0.5, 1.5), 0.5).unwrap();
     for (what, operands, volume) in [
         ("edge", vec![cube([0.0; 3]), cube([1.0, 1.0, 0.0])], 2.0),
         ("corner", vec![cube([0.0; 3]), cube([1.0; 3])], 2.0),
         ("tangent ball", vec![cube([0.0; 3]), ball.clone()], 1.0 + PI / 6.0),
-        ("lattice", lattice.map(|c| cube(c.map(f64::from))).collect(), 14.0),
+        ("lattice", lattice(), 14.0),
     ] {
         for turn in [|placed: Placed| placed, turned] {
             let description = tree(what, NodeKind::Union, operands.iter().cloned().map(turn).collect());
@@ -333,9 +331,8 @@ fn rays_see_the_same_solid() {
                 _ => far += 1,
             }
         }
-        println!("{name} {solid}: {far} of {hits} differ");
         // Rays past a silhouette or an edge see something else behind it.
-        assert!(hits > 300 && far * 50 < hits, "{name} {solid}: {far} of {hits} differ");
+        assert!(hits > 300 && far * 200 < hits, "{name} {solid}: {far} of {hits} differ");
     }
 }
 
@@ -369,9 +366,7 @@ fn voxels_of_a_ball_and_a_box() {
 /// Voxels that touch at edges and corners.
 #[test]
 fn voxels_of_a_lattice() {
-    let cubes = (0..27).map(|i| [i % 3, i / 3 % 3, i / 9]).filter(|c| c.iter().sum::<i32>() % 2 == 0);
-    let cubes = cubes.map(|c| DVec3::from_array(c.map(f64::from))).map(|lo| cuboid(lo, lo + 1.0)).collect();
-    let solids = Solids::new(&tree("lattice", NodeKind::Union, cubes), &[]).unwrap();
+    let solids = Solids::new(&tree("lattice", NodeKind::Union, lattice()), &[]).unwrap();
     let fineness = Fineness { tolerance: 0.1, cells: None, memory: MEMORY };
     let found = Voxels::new(&solids, 1.0, &fineness, &Watch::NONE).unwrap();
     assert_eq!(found.count(), 14);

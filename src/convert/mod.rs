@@ -118,7 +118,8 @@ pub fn surface(solids: &Solids, fineness: &Fineness, watch: &Watch<'_>) -> Resul
         let found = on_grid(solids, &samples, fineness, watch)?;
         let is_last = fineness.cells.is_some() || grid.spacing <= LAST * fineness.tolerance;
         if is_last || found.distances.largest() <= fineness.tolerance {
-            return Ok(found);
+            let what = || format!("no corner of a grid with cells of {:.2e} is inside the solids", grid.spacing);
+            return if found.mesh.triangles.is_empty() { Err(empty(what())) } else { Ok(found) };
         }
         known = Some((count, samples.meetings.len(), Some(found.distances.largest())));
         count *= 2.0;
@@ -154,6 +155,11 @@ fn on_grid(solids: &Solids, samples: &Samples, fineness: &Fineness, watch: &Watc
     let topology =
         check::check(&mesh).map_err(|what| Error::Mismatch(format!("the mesh made is not closed: {what}")))?;
     Ok(Surface { mesh, grid, distances, topology })
+}
+
+/// Nothing is left to write.
+fn empty(what: String) -> Error {
+    Error::Usage(format!("{what}: they are empty, or thinner than that everywhere"))
 }
 
 /// What a grid that needs `bytes` is, and what would fit.

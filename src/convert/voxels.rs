@@ -16,7 +16,7 @@ use super::snap::snap;
 use super::vertices::in_the_middle;
 use super::watch::Watch;
 use super::weave::Net;
-use super::{BYTES_PER_MEETING, Fineness, afford};
+use super::{BYTES_PER_MEETING, Fineness, afford, empty};
 use crate::error::{Error, Result};
 use crate::scene::mesh::Mesh;
 
@@ -88,6 +88,9 @@ impl Voxels {
         afford(meetings.len() as u64 * BYTES_PER_MEETING, fineness, || {
             format!("{} faces of voxels need", meetings.len())
         })?;
+        if meetings.is_empty() {
+            return Err(empty(format!("no voxel of {:.2e} has its middle inside the solids", self.spacing)));
+        }
         let samples = Samples { grid: self.grid, rows: self.rows, meetings, loose: Vec::new() };
         let net = Net::new(&samples, None);
         let positions = snap(&in_the_middle(&samples, &net)).map_err(Error::Usage)?;
