@@ -111,12 +111,15 @@ impl Work<'_> {
     fn begin(&mut self, spacing: f64) {
         self.seen.clone_from(&self.known);
         self.guess(spacing);
-        if Qef::new(&self.seen).is_flat()
-            && self.piece.contains(self.at, 0.0)
-            && self.known.len() == self.piece.planes.len()
-        {
+        let is_one_face = Qef::new(&self.seen).is_flat() && self.is_on_all(spacing);
+        if is_one_face && self.piece.contains(self.at, 0.0) && self.known.len() == self.piece.planes.len() {
             self.state = State::Found;
         }
+    }
+
+    /// Whether all planes seen pass through the guess.
+    fn is_on_all(&self, spacing: f64) -> bool {
+        self.seen.iter().all(|p| p.normal.dot(self.at - p.point).abs() <= ON * spacing)
     }
 
     /// The point that the planes seen fix, not too far beyond the cell.
@@ -179,7 +182,7 @@ fn look_nearer(world: &World<f64>, tracer: &mut Tracer, works: &mut [Work], spac
             work.seen = again;
             work.guess(spacing);
         }
-        work.sure &= work.seen.iter().all(|p| p.normal.dot(work.at - p.point).abs() <= ON * spacing);
+        work.sure &= work.is_on_all(spacing);
     }
 }
 
