@@ -123,7 +123,7 @@ fn a_mesh_stands_beside_its_solid() {
     assert!(ended.out.starts_with("block.obj\ntriangles "), "{}", ended.out);
     let scene = format!("{BLOCK}\nmesh \"block.obj\" {{ translate 0 4 0 }}\n");
     std::fs::write(dir.path().join("both.kdl"), scene).expect("a scene");
-    let verified = lanecast(dir.path(), &["verify", "both.kdl", "--size", "32x18", "--rays", "primary"]);
+    let verified = lanecast(dir.path(), &["verify", "both.kdl", "--rays", "500"]);
     assert_eq!(verified.code, Some(0), "{}{}", verified.out, verified.err);
 }
 
