@@ -17,7 +17,8 @@ pub struct Distances {
     /// Of points of the mesh from the surface: its vertices, middles of diagonals and triangles. Measured along up to
     /// four lines through each point, so the true ones are not larger.
     pub mesh: f64,
-    /// Of points of the surface from the mesh: where the lines of the grid cross it.
+    /// Of points of the surface from the mesh: where the lines of the grid cross it. What is nearer than half the
+    /// tolerance counts as half.
     pub solid: f64,
 }
 
