@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | 8 | [`cli`] | arguments, commands, progress, exit codes |
 //! | 7 | [`measure`], [`view`] | ray sets, timing, statistics, verification, reports; terminal, viewers, windows |
-//! | 6 | [`render`], [`mod@reference`] | the tile scheduler, progressive blocks; the f64 oracle (floors 0, 3 and 5 only) |
+//! | 6 | [`render`], [`convert`], [`mod@reference`] | tile scheduler, blocks; solids as meshes; the f64 oracle (floors 0, 3, 5) |
 //! | 5 | [`film`], [`shade`] | framebuffer and image files; materials, lights, integrators |
 //! | 4 | [`trace`] | the engines behind one trait |
 //! | 3 | [`scene`], [`camera`] | description, importers, world; cameras, tiles, ray generation |
@@ -23,6 +23,7 @@
 pub mod bvh;
 pub mod camera;
 pub mod cli;
+pub mod convert;
 pub mod csg;
 pub mod error;
 pub mod film;

@@ -13,7 +13,7 @@ const FLOORS: [&[&str]; 9] = [
     &["scene", "camera"],
     &["trace"],
     &["film", "shade"],
-    &["render", "reference"],
+    &["render", "convert", "reference"],
     &["measure", "view"],
     &["cli"],
 ];

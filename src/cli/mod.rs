@@ -5,6 +5,7 @@ pub mod output;
 
 mod bench;
 mod compare;
+mod convert;
 mod explain;
 mod info;
 mod interrupt;
@@ -41,6 +42,7 @@ Examples:
   lanecast compare a.exr b.exr -o heat.png             how far are two pictures apart, and where
   lanecast explain model.ply --engine scalar,packet16  why one engine beats another
   lanecast report out -o report.html                   results as one page to show to others
+  lanecast convert builtin:bolt --solid bolt -o b.stl  solids as a closed mesh, or as voxels
   lanecast rays model.ply --kind ao -o ao.npy          rays for this and other programs
   lanecast trace model.ply --rays ao.npy --query any   trace a file of rays
 
@@ -73,6 +75,8 @@ enum Command {
     Report(report::ReportArgs),
     /// Compare two pictures, or two files of hits: errors, what a person sees, classes, heat maps
     Compare(compare::CompareArgs),
+    /// Solids as a closed triangle mesh (STL, OBJ, PLY) or as voxels (NPY)
+    Convert(convert::ConvertArgs),
     /// Compare every engine with the f64 oracle, and bit for bit with each other
     Verify(verify::VerifyArgs),
     /// Counts, bounds, memory, tree quality and warnings of a scene
@@ -113,6 +117,7 @@ fn run(command: &Command) -> Result<()> {
         Command::Compare(args) => &args.output,
         Command::Explain(args) => &args.output,
         Command::Report(args) => &args.output,
+        Command::Convert(args) => &args.output,
         Command::Verify(args) => &args.output,
         Command::Info(args) => &args.output,
     };
@@ -128,6 +133,7 @@ fn run(command: &Command) -> Result<()> {
         Command::Compare(args) => compare::run(args),
         Command::Explain(args) => explain::run(args),
         Command::Report(args) => report::run(args),
+        Command::Convert(args) => convert::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Info(args) => info::run(args),
     }

@@ -1,4 +1,5 @@
-//! The film: named planes of pixels over a data window, and the files they live in (EXR, PNG, NPY, PIX).
+//! The film: named planes of pixels over a data window, and the files they live in (EXR, PNG, NPY, PIX), and files
+//! of meshes.
 //!
 //! All writers go through [`write_atomically`]: a reader sees the old file or the whole new one, never a part.
 //! All readers take hostile input: what a header claims is checked against the file's length before memory is taken.
@@ -6,6 +7,7 @@
 pub mod atomic;
 pub mod exr;
 pub mod heat;
+pub mod mesh;
 pub mod metrics;
 pub mod npy;
 pub mod pfm;

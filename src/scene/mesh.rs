@@ -79,4 +79,24 @@ impl Mesh {
         }
         range
     }
+
+    /// Volume inside, if the mesh is closed and winds counter-clockwise seen from outside (the divergence theorem).
+    pub fn volume(&self) -> f64 {
+        // From a point nearby: far from the origin, products would cancel.
+        let near = self.positions.first().copied().unwrap_or(DVec3::ZERO);
+        let tetrahedron = |i| {
+            let [a, b, c] = self.corners(i).map(|p| p - near);
+            a.dot(b.cross(c)) / 6.0
+        };
+        (0..self.triangles.len()).map(tetrahedron).sum()
+    }
+
+    /// Sum of the triangles' areas.
+    pub fn area(&self) -> f64 {
+        let triangle = |i| {
+            let [a, b, c] = self.corners(i);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        (0..self.triangles.len()).map(triangle).sum()
+    }
 }

@@ -26,6 +26,10 @@ pub struct Stretch {
     pub prim_in: u32,
     /// Primitive that is left through; [`INVALID_ID`] where the segment ends inside.
     pub prim_out: u32,
+    /// u and v of the hit where it is entered: the face's number, and 1 where the leaf was subtracted.
+    pub uv_in: [f64; 2],
+    /// The same where it is left.
+    pub uv_out: [f64; 2],
 }
 
 /// All stretches of the rays of a batch, `V::N` rays at a time, in order of ray, `t_in`, instance and primitive.
@@ -64,6 +68,22 @@ struct Job<'a, V: Lanes> {
 struct Open {
     t_in: f64,
     prim_in: u32,
+    uv_in: [f64; 2],
+}
+
+/// Where a stretch ends.
+#[derive(Clone, Copy)]
+struct Close {
+    t_out: f64,
+    prim_out: u32,
+    uv_out: [f64; 2],
+}
+
+impl Close {
+    /// The surface as the other end of a stretch.
+    fn opens(self) -> Open {
+        Open { t_in: self.t_out, prim_in: self.prim_out, uv_in: self.uv_out }
+    }
 }
 
 impl<V: Lanes> Job<'_, V> {
@@ -120,8 +140,13 @@ impl<V: Lanes> Job<'_, V> {
         while hit != 0 {
             let lane = hit.trailing_zeros() as usize;
             hit &= hit - 1;
-            let open = Open { t_in: span.t_in.lane(lane).to_f64(), prim_in: prim };
-            self.close(packet, lane, open, span.t_out.lane(lane).to_f64(), prim, inst);
+            let end = |t: V, face: V| Close {
+                t_out: t.lane(lane).to_f64(),
+                prim_out: prim,
+                uv_out: [face.lane(lane).to_f64(), 0.0],
+            };
+            let (enter, leave) = (end(span.t_in, span.face_in), end(span.t_out, span.face_out));
+            self.close(packet, lane, enter.opens(), leave, inst);
         }
     }
 
@@ -133,7 +158,7 @@ impl<V: Lanes> Job<'_, V> {
         lanes: u32,
         inst: u32,
     ) {
-        let endless = Open { t_in: f64::NEG_INFINITY, prim_in: INVALID_ID };
+        let endless = Open { t_in: f64::NEG_INFINITY, prim_in: INVALID_ID, uv_in: [0.0; 2] };
         let mut open = [placed.solid.reaches_everywhere().then_some(endless); MAX_LANES];
         let mut scratch = self.solids.take().unwrap_or_default();
         csg::sweep(&placed.solid, packet, (lanes, interval), self.t_max, Depth::Whole, &mut scratch, |boundary| {
@@ -143,10 +168,12 @@ impl<V: Lanes> Job<'_, V> {
             while rest != 0 {
                 let lane = rest.trailing_zeros() as usize;
                 rest &= rest - 1;
-                let t = t.lane(lane).to_f64();
+                let turned = f64::from(boundary.turned >> lane & 1);
+                let uv_out = [boundary.face.lane(lane).to_f64(), turned];
+                let end = Close { t_out: t.lane(lane).to_f64(), prim_out: prim, uv_out };
                 match open[lane].take() {
-                    Some(entered) => self.close(packet, lane, entered, t, prim, inst),
-                    None => open[lane] = Some(Open { t_in: t, prim_in: prim }),
+                    Some(entered) => self.close(packet, lane, entered, end, inst),
+                    None => open[lane] = Some(end.opens()),
                 }
             }
             0
@@ -154,13 +181,15 @@ impl<V: Lanes> Job<'_, V> {
         *self.solids = Some(scratch);
         for lane in (0..V::N).filter(|lane| lanes >> lane & 1 != 0) {
             if let Some(entered) = open[lane] {
-                self.close(packet, lane, entered, f64::INFINITY, INVALID_ID, inst);
+                let end = Close { t_out: f64::INFINITY, prim_out: INVALID_ID, uv_out: [0.0; 2] };
+                self.close(packet, lane, entered, end, inst);
             }
         }
     }
 
     /// Adds a stretch, cut to the segment; a stretch of no length is none.
-    fn close(&mut self, packet: &Packet<V>, lane: usize, open: Open, t_out: f64, prim_out: u32, inst: u32) {
+    fn close(&mut self, packet: &Packet<V>, lane: usize, open: Open, end: Close, inst: u32) {
+        let Close { t_out, prim_out, uv_out } = end;
         let (t_min, t_max) = (packet.t_min.lane(lane).to_f64(), self.t_max.lane(lane).to_f64());
         let starts_inside = open.t_in < t_min || open.t_in == f64::NEG_INFINITY;
         let ends_inside = t_out > t_max || t_out == f64::INFINITY;
@@ -171,6 +200,8 @@ impl<V: Lanes> Job<'_, V> {
             t_out: if ends_inside { t_max } else { t_out },
             prim_in: if starts_inside { INVALID_ID } else { open.prim_in },
             prim_out: if ends_inside { INVALID_ID } else { prim_out },
+            uv_in: if starts_inside { [0.0; 2] } else { open.uv_in },
+            uv_out: if ends_inside { [0.0; 2] } else { uv_out },
         };
         if stretch.t_in < stretch.t_out {
             self.list.push(stretch);

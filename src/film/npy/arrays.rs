@@ -242,6 +242,18 @@ pub fn write_stretches(path: &Path, stretches: &[Stretch]) -> Result<u64> {
     })
 }
 
+/// Writes flags of voxels as `|u1` of shape (nz, ny, nx): x runs fastest. `size` is nx, ny; `planes` have nx ny flags.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_voxels(path: &Path, size: [usize; 2], planes: impl IntoIterator<Item = Vec<u8>>) -> Result<u64> {
+    let row = [size[1] as u64, size[0] as u64];
+    write_array(path, &Descr::Plain("|u1".to_owned()), &row, planes, |plane, bytes| {
+        bytes.extend_from_slice(plane);
+        1
+    })
+}
+
 /// Streams batches into an array of shape (N, `row`..). `encode` appends a batch's bytes and says how many rows they
 /// are. N is known only at the end; the header has room for it, see [`header::bytes`].
 fn write_array<B>(

@@ -8,6 +8,7 @@
 //! | rays | `<f4` (reading also `<f8`) | (N, 8): ox oy oz t_min dx dy dz t_max |
 //! | hits | `t <f4, u <f4, v <f4, prim <u4, inst <u4` | (N) |
 //! | occlusion | `\|u1` (reading also `\|b1`) | (N), 1 is occluded |
+//! | voxels | `\|u1` | (nz, ny, nx), 1 is inside (only written) |
 //! | plane | `<f4` or `<u4` | (height, width) |
 //!
 //! Readers check the shape against the file's length before they take memory, and stream; writers stream too.
@@ -20,7 +21,7 @@ mod planes;
 
 pub use arrays::{
     parse_hits, parse_occlusion, parse_rays, read_hits, read_occlusion, read_rays, write_hits, write_occlusion,
-    write_rays, write_stretches,
+    write_rays, write_stretches, write_voxels,
 };
 pub use kind::{Kind, kind};
 pub use planes::{parse_film, parse_plane, read_film, read_plane, write_plane, write_stack};
