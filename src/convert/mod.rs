@@ -61,7 +61,7 @@ const FIRST: (f64, f64) = (16.0, 64.0);
 const LAST: f64 = 0.25;
 /// Where the grid's planes are between its cells' edges and the box of the solids: no simple fraction, so that flat
 /// faces do not lie in them.
-const SHIFT: DVec3 = DVec3::new(0.318_309_886, 0.367_879_441, 0.414_213_562);
+const SHIFT: DVec3 = DVec3::new(std::f64::consts::FRAC_1_PI, 0.367_879_441, 0.414_213_562);
 /// Bytes for a crossed edge: its meeting, cells, vertices, quadrilateral, triangles and what checks them.
 const BYTES_PER_MEETING: u64 = 640;
 
