@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use lanecast::camera::{Camera, PixelRect, SubPixel, Tiling, fill_tile};
-use lanecast::lanes::{Lanes, Real};
+use lanecast::lanes::Lanes;
 use lanecast::ray::{Hits, Rays};
 use lanecast::scene::builtin;
 use lanecast::scene::world::{Met, Preset, World};

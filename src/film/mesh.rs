@@ -132,7 +132,8 @@ mod tests {
                 MeshKind::Ply => ply::parse(&path, &bytes),
             };
             let back = back.unwrap();
-            let corners = |m: &Mesh| (0..m.triangles.len()).map(|i| m.corners(i)).collect::<Vec<_>>();
+            // Decimals of a text are those of an `f32`.
+            let corners = |m: &Mesh| (0..m.triangles.len()).map(|i| m.corners(i).map(single)).collect::<Vec<_>>();
             assert_eq!(corners(&back), corners(&mesh), "{name}");
             assert_eq!(back.positions.len(), 4, "{name}");
         }
