@@ -1,14 +1,14 @@
 //! Solids as closed triangle meshes and as voxels.
 //!
 //! A uniform grid is laid around the solids; the rays along its lines say where they are inside, with the exact
-//! place and normal of every crossing ([`samples`]). The mesh is the grid's dual: a vertex in each cell the surface
-//! passes, several where several pieces pass (G. M. Nielson, "Dual Marching Cubes", 2004; [`cell`]), woven to a
-//! manifold ([`weave`]; S. Schaefer, T. Ju, J. Warren, "Manifold Dual Contouring", 2007, have the same aim). A vertex
+//! place and normal of every crossing (`samples`). The mesh is the grid's dual: a vertex in each cell the surface
+//! passes, several where several pieces pass (G. M. Nielson, "Dual Marching Cubes", 2004; `cell`), woven to a
+//! manifold (`weave`; S. Schaefer, T. Ju, J. Warren, "Manifold Dual Contouring", 2007, have the same aim). A vertex
 //! is at the point nearest to the tangent planes of its piece's crossings, so that edges and corners stay sharp
-//! (T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data", 2002; [`qef`]); more rays bring it
+//! (T. Ju, F. Losasso, S. Schaefer, J. Warren, "Dual Contouring of Hermite Data", 2002; `qef`); more rays bring it
 //! onto the surface itself (the idea of L. Kobbelt, M. Botsch, U. Schwanecke, H.-P. Seidel, "Feature Sensitive Surface
-//! Extraction from Volume Data", 2001; [`settle`]). Quadrilaterals are cut along the diagonal that is nearer to the
-//! true surface ([`triangles`]), distances are measured with rays ([`measure`]), and what leaves this module was
+//! Extraction from Volume Data", 2001; `settle`). Quadrilaterals are cut along the diagonal that is nearer to the
+//! true surface (`triangles`), distances are measured with rays ([`measure`]), and what leaves this module was
 //! checked to be closed and a manifold ([`mod@check`]).
 //!
 //! The first grid has cells of four times the tolerance, but no more than 64 along the longest side; cells are halved
