@@ -2,133 +2,18 @@
 //! its bits; `tile`, which has an arithmetic of its own, has its answers but where the oracle's margins explain it.
 
 mod common;
+mod tile_support;
 
-use std::borrow::Cow;
-use std::ops::Deref;
 use std::path::Path;
-use std::sync::Arc;
 
 use common::{Random, ball, soup};
-use glam::{DAffine3, DVec3};
-use lanecast::measure::answers::Answers;
-use lanecast::measure::truth;
+use glam::DVec3;
 use lanecast::ray::{Counters, Hits, Rays};
-use lanecast::reference::Oracle;
-use lanecast::scene::description::{Description, ItemKind};
 use lanecast::scene::mesh::Mesh;
 use lanecast::scene::world::{Preset, World};
 use lanecast::scene::{ply, unpack};
-use lanecast::trace::{Engine, Scratch, engine};
-
-/// A world and the oracle that judges it.
-struct Scene {
-    world: World<f32>,
-    oracle: Oracle,
-}
-
-impl Scene {
-    fn new(world: World<f32>) -> Self {
-        Self { oracle: Oracle::new(&world.assembly), world }
-    }
-}
-
-impl Deref for Scene {
-    type Target = World<f32>;
-
-    fn deref(&self) -> &World<f32> {
-        &self.world
-    }
-}
-
-fn compile(meshes: Vec<Mesh>) -> Scene {
-    let mut d = Description::new("meshes");
-    for (i, mesh) in meshes.into_iter().enumerate() {
-        d.meshes.push(Arc::new(mesh));
-        d.groups[0].items.push(common::item(ItemKind::Mesh(i as u32), DAffine3::IDENTITY));
-    }
-    Scene::new(World::compile(&d, Preset::Balanced).unwrap())
-}
-
-fn find(name: &str) -> &'static dyn Engine<f32> {
-    engine::<f32>(name).unwrap()
-}
-
-/// How many answers differ from the scalar engine's, bit by bit: closest hits, any-hits.
-fn differences(world: &Scene, rays: &Rays<f32>) -> (usize, usize) {
-    let mut scratch = Scratch::default();
-    let (mut want, mut got) = (Hits::default(), Hits::default());
-    find("scalar").intersect(world, rays, &mut want, &mut scratch, None);
-    find("tile-exact").intersect(world, rays, &mut got, &mut scratch, None);
-    let bits = |h: &Hits<f32>, i: usize| (h.t[i].to_bits(), h.u[i].to_bits(), h.v[i].to_bits(), h.prim[i], h.inst[i]);
-    let closest = (0..rays.len()).filter(|&i| bits(&want, i) != bits(&got, i)).count();
-    let (mut any_want, mut any) = (Vec::new(), Vec::new());
-    find("scalar").occluded(world, rays, &mut any_want, &mut scratch, None);
-    find("tile-exact").occluded(world, rays, &mut any, &mut scratch, None);
-    let different = (0..rays.len()).filter(|&i| any_want[i] != any[i]).count();
-    find("tile").intersect(world, rays, &mut got, &mut scratch, None);
-    find("tile").occluded(world, rays, &mut any, &mut scratch, None);
-    let (want, any_want) = (Answers::Closest(vec![want]), Answers::Any(vec![any_want]));
-    explained(world, rays, &want, Answers::Closest(vec![got.clone()]));
-    explained(world, rays, &any_want, Answers::Any(vec![any.clone()]));
-    for small in ["tile-16x16", "tile-8x8", "tile-4x4"] {
-        find(small).intersect(world, rays, &mut got, &mut scratch, None);
-        find(small).occluded(world, rays, &mut any, &mut scratch, None);
-        admitted(world, rays, &want, &Answers::Closest(vec![got.clone()]));
-        admitted(world, rays, &any_want, &Answers::Any(vec![any.clone()]));
-    }
-    (closest, different)
-}
-
-/// Lets the oracle judge where `own` is not `scalar` up to rounding.
-fn admitted(scene: &Scene, rays: &Rays<f32>, scalar: &Answers<f32>, own: &Answers<f32>) {
-    let batches = std::slice::from_ref(rays);
-    if let Err(why) = truth::admit(find("tile"), batches, scalar, own, || Cow::Borrowed(&scene.oracle)) {
-        panic!("{why}");
-    }
-}
-
-/// The same, and a sample of the rest.
-fn explained(scene: &Scene, rays: &Rays<f32>, scalar: &Answers<f32>, own: Answers<f32>) {
-    admitted(scene, rays, scalar, &own);
-    let (batches, oracle) = (std::slice::from_ref(rays), &scene.oracle);
-    let counts = truth::judge(oracle, truth::OWN_MARGIN_FACTOR, batches, &own, 199);
-    assert_eq!(counts.unexplained, 0, "{:?}", counts.samples);
-}
-
-/// Morton order in squares of 32.
-fn pixel(i: usize, width: usize) -> (usize, usize) {
-    let even = |i: usize| (0..5).fold(0, |x, bit| x | (i >> (2 * bit) & 1) << bit);
-    let (tile, inside) = (i / 1024, i % 1024);
-    (tile % (width / 32) * 32 + even(inside), tile / (width / 32) * 32 + even(inside >> 1))
-}
-
-/// A picture of `n` x `n` rays from `eye` towards `target`.
-fn camera(eye: DVec3, target: DVec3, tan: f64, n: usize) -> Rays<f32> {
-    let forward = (target - eye).normalize();
-    let (right, up) = forward.any_orthonormal_pair();
-    let mut rays = Rays::new(n * n);
-    for i in 0..n * n {
-        let (x, y) = pixel(i, n);
-        let across = |p: usize| (p as f64 + 0.5) / n as f64 * 2.0 - 1.0;
-        let dir = forward + right * (tan * across(x)) + up * (tan * across(y));
-        rays.set(i, eye.as_vec3().to_array(), dir.as_vec3().to_array(), 0.0, f32::INFINITY);
-    }
-    rays
-}
-
-/// From the hits of `rays` to `light`, t = `end` at the light.
-fn shadows(world: &World<f32>, rays: &Rays<f32>, light: DVec3, end: f32, t_min: f32) -> Rays<f32> {
-    let (mut hits, mut scratch) = (Hits::default(), Scratch::default());
-    find("scalar").intersect(world, rays, &mut hits, &mut scratch, None);
-    let mut out = Rays::new(rays.len());
-    for i in (0..rays.len()).filter(|&i| hits.is_hit(i)) {
-        let at = |v: [f32; 3]| glam::Vec3::from_array(v);
-        let org = at(rays.org(i)) + at(rays.dir(i)) * hits.t[i];
-        let dir = (light - org.as_dvec3()) / f64::from(end);
-        out.set(i, org.to_array(), dir.as_vec3().to_array(), t_min, end);
-    }
-    out
-}
+use lanecast::trace::Scratch;
+use tile_support::{Scene, camera, compile, differences, find, shadows};
 
 fn worlds() -> Vec<(&'static str, Scene)> {
     let mut r = Random(77);

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::lanes::{FlushDenormals, Real};
 use crate::measure::answers::Answers;
-use crate::measure::peers::{Peer, rename};
+use crate::measure::peers::Peer;
 use crate::measure::raysets::Query;
 use crate::ray::{Counters, Hits, Rays};
 use crate::scene::world::World;
@@ -102,7 +102,7 @@ impl Workers {
                 let pack = |(rays, hits)| (peer.pack(rays, Query::Closest), hits);
                 let packed = batches.par_iter().zip(&mut *out).map(pack).collect();
                 let seconds = self.timed(packed, |(packed, hits): &mut (_, &mut _), _| packed.intersect(hits));
-                out.par_iter_mut().for_each(|hits| rename(peer.ids(), hits));
+                out.par_iter_mut().for_each(|hits| peer.rename(hits));
                 seconds
             }
             Answers::Any(out) => {

@@ -39,9 +39,7 @@ struct TopLeaves<'a, S>(&'a World<S>);
 
 impl<V: Lanes, const ANY: bool, const COUNT: bool> Leaves<V, ANY, COUNT> for TopLeaves<'_, V::Scalar> {
     fn visit(&self, packet: &Packet<V>, query: &mut Query<V, ANY, COUNT>, leaf: Child, lanes: u32) {
-        for &inst in &self.0.top_blocks[leaf.index as usize][..usize::from(leaf.count)] {
-            instance(self.0, inst, packet, query, lanes);
-        }
+        instance(self.0, self.0.top_leaves[leaf.index as usize], packet, query, lanes);
     }
 }
 

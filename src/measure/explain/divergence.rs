@@ -92,7 +92,8 @@ fn descend<'a, S: Real>(world: &'a World<S>, place: &Place<'a, S>, below: &mut V
                 if !child.is_leaf() {
                     below.push(Place::Node { tree, top: *top, node: child.index, ways });
                 } else if *top {
-                    let instances = &world.top_blocks[child.index as usize][..usize::from(child.count)];
+                    let at = child.index as usize;
+                    let instances = &world.top_leaves[at..=at];
                     below.push(Place::Instances { instances, ways });
                 }
             }

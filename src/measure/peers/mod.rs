@@ -19,7 +19,7 @@ use crate::measure::raysets::Query;
 use crate::measure::timing::Workers;
 use crate::ray::{Hits, Rays};
 use crate::scene::assembly::Assembly;
-use triangles::WorldTriangles;
+use triangles::{PlacedTriangles, Triangles};
 
 /// What `--peers` takes.
 pub const NAMES: [&str; 3] = ["obvhs", "embree", "embree-robust"];
@@ -45,23 +45,23 @@ pub trait Peer<S>: Send + Sync {
     fn facts(&self) -> &Facts;
     /// The rays of one batch in the peer's own layout, ready for `query`; not under the clock.
     fn pack<'a>(&'a self, rays: &Rays<S>, query: Query) -> Box<dyn Packed<S> + 'a>;
-    /// Our primitive and instance number for each of the peer's primitive numbers.
-    fn ids(&self) -> &[[u32; 2]];
+    /// Turns the peer's own numbers of hits into our primitive and instance numbers; not under the clock.
+    fn rename(&self, hits: &mut Hits<S>);
 }
 
 /// One batch in a peer's own ray layout. Rays may be used up by a call, as Embree's are: one call per packing.
 pub trait Packed<S>: Send {
-    /// Closest hits, with the peer's own number in `prim` and 0 in `inst`; see [`rename`].
+    /// Closest hits, with the peer's own numbers in `prim` and `inst`; see [`Peer::rename`].
     fn intersect(&mut self, hits: &mut Hits<S>);
     /// 1 for each ray whose segment holds something, else 0.
     fn occluded(&mut self, out: &mut Vec<u8>);
 }
 
-/// Turns a peer's primitive numbers into ours.
-pub fn rename<S: Real>(ids: &[[u32; 2]], hits: &mut Hits<S>) {
+/// Gives each hit the primitive and instance number that `ours` says, from the peer's own two.
+fn rename<S: Real>(hits: &mut Hits<S>, ours: impl Fn(u32, u32) -> Option<[u32; 2]>) {
     for i in 0..hits.len() {
         if hits.is_hit(i)
-            && let Some(&[prim, inst]) = ids.get(hits.prim[i] as usize)
+            && let Some([prim, inst]) = ours(hits.prim[i], hits.inst[i])
         {
             (hits.prim[i], hits.inst[i]) = (prim, inst);
         }
@@ -96,7 +96,7 @@ impl Invitation {
         })
     }
 
-    /// Builds every peer's scene from the triangles of `assembly`, with as many threads as `workers` has. To be called
+    /// Builds every peer's scene from the triangles of `assembly` (and its instances, if it knows them), with as many threads as `workers` has. To be called
     /// from a thread that is not pinned to a core: Embree's build threads inherit where they may run.
     ///
     /// # Errors
@@ -106,20 +106,23 @@ impl Invitation {
         if self.names.is_empty() {
             return Ok(Vec::new());
         }
-        let triangles = WorldTriangles::flatten(assembly).map(Arc::new);
+        let wanted = |obvhs: bool| self.names.iter().any(|name| (name == "obvhs") == obvhs);
+        let flat = wanted(true).then(|| Triangles::flatten(assembly));
+        let placed = wanted(false).then(|| PlacedTriangles::of(assembly).map(Arc::new));
         let mut guests = Vec::new();
+        let mut add = |name, modes: std::result::Result<_, String>| {
+            guests.push(Guest { name, modes: modes.and_then(of_precision) });
+        };
         for name in &self.names {
-            let (families, build): (&[&'static str], _) = match name.as_str() {
-                "obvhs" => (&obvhs::NAMES, None),
-                "embree" => (&["embree"], Some(false)),
-                _ => (&["embree-robust"], Some(true)),
-            };
-            for &family in families {
-                let modes = triangles.clone().and_then(|triangles| match build {
-                    None => workers.install(|| obvhs::build(family, &triangles)).map(|peer| vec![peer]),
-                    Some(robust) => embree::open(self.embree.as_deref(), triangles, workers.threads(), robust),
-                });
-                guests.push(Guest { name: family, modes: modes.and_then(of_precision) });
+            let (embree, robust) = if name == "embree" { ("embree", false) } else { ("embree-robust", true) };
+            if name == "obvhs" {
+                for (family, triangles) in obvhs::NAMES.into_iter().zip(flat.iter().cycle()) {
+                    let build = |triangles| workers.install(|| obvhs::build(family, triangles));
+                    add(family, triangles.as_ref().map_err(Clone::clone).and_then(build).map(|peer| vec![peer]));
+                }
+            } else if let Some(triangles) = placed.clone() {
+                let open = |triangles| embree::open(self.embree.as_deref(), triangles, workers.threads(), robust);
+                add(embree, triangles.and_then(open));
             }
         }
         Ok(guests)

@@ -13,8 +13,8 @@ use obvhs::ray::{INVALID_ID, Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
-use super::triangles::WorldTriangles;
-use super::{Facts, Packed, Peer};
+use super::triangles::Triangles;
+use super::{Facts, Packed, Peer, rename};
 use crate::measure::raysets::Query;
 use crate::ray::{Hits, Rays};
 
@@ -29,7 +29,7 @@ pub const MAX_COINCIDENT: usize = 500;
 ///
 /// # Errors
 /// Why it cannot have these triangles.
-pub fn build(name: &'static str, triangles: &WorldTriangles) -> Result<Box<dyn Peer<f32>>, String> {
+pub fn build(name: &'static str, triangles: &Triangles) -> Result<Box<dyn Peer<f32>>, String> {
     let list: Vec<Triangle> = (0..triangles.indices.len()).map(|i| triangle(triangles.corners(i))).collect();
     let coincident = most_coincident(&list);
     if coincident > MAX_COINCIDENT {
@@ -55,7 +55,7 @@ fn finish<T: Traverse>(
     name: &'static str,
     tree: T,
     list: &[Triangle],
-    triangles: &WorldTriangles,
+    triangles: &Triangles,
     start: Instant,
 ) -> Box<dyn Peer<f32>> {
     let order = tree.order();
@@ -147,8 +147,8 @@ impl<T: Traverse> Peer<f32> for Obvhs<T> {
         Box::new(Batch { peer: self, rays: (0..rays.len()).map(one).collect() })
     }
 
-    fn ids(&self) -> &[[u32; 2]] {
-        &self.ids
+    fn rename(&self, hits: &mut Hits<f32>) {
+        rename(hits, |prim, _| self.ids.get(prim as usize).copied());
     }
 }
 
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn coincident_centres_are_counted_and_refused() {
         let (a, b) = ([0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]);
-        let mut scene = WorldTriangles { vertices: vec![a, b, [1.0, 0.0, 0.0, 0.0]], ..Default::default() };
+        let mut scene = Triangles { vertices: vec![a, b, [1.0, 0.0, 0.0, 0.0]], ..Default::default() };
         for i in 0..=MAX_COINCIDENT as u32 {
             scene.indices.push([0, 1, 2]);
             scene.ids.push([i, 0]);

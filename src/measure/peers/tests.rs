@@ -48,6 +48,19 @@ fn soup() -> Description {
     scene
 }
 
+/// The soup again, but the moved one five times: mirrored, sheared, two of them under one parent.
+fn instances() -> Description {
+    let mut scene = soup();
+    let item = |child, transform| Item { transform, material: None, kind: ItemKind::Instance(child) };
+    let mut sheared = DAffine3::from_scale_rotation_translation(DVec3::splat(0.3), Default::default(), DVec3::Y * 2.0);
+    sheared.matrix3.y_axis.x = 0.2;
+    let mirrored = DAffine3::from_scale(DVec3::new(-0.4, 0.7, 0.5)) * DAffine3::from_rotation_z(0.6);
+    scene.groups.push(Group { items: vec![item(1, sheared), item(1, mirrored)], ..Default::default() });
+    let far = DAffine3::from_translation(DVec3::new(2.0, -3.0, 1.0));
+    scene.groups[0].items.extend([item(1, mirrored), item(2, far), item(2, DAffine3::from_rotation_x(2.0))]);
+    scene
+}
+
 /// Rays of several lengths and batch sizes, every seventh dead.
 fn rays() -> Vec<Rays<f32>> {
     let mut random = Random(2);
@@ -64,9 +77,9 @@ fn rays() -> Vec<Rays<f32>> {
 }
 
 /// Both queries of every peer against scalar; returns how many peers there were.
-fn agree_on_the_soup(invitation: &Invitation, threads: usize) -> std::result::Result<usize, String> {
+fn agree(scene: &Description, invitation: &Invitation, threads: usize) -> std::result::Result<usize, String> {
     let workers = Workers::new(threads).unwrap().flushing(true);
-    let (world, batches) = (World::<f32>::compile(&soup(), Preset::Fast).unwrap(), rays());
+    let (world, batches) = (World::<f32>::compile(scene, Preset::Fast).unwrap(), rays());
     let scalar = engine::<f32>("scalar").unwrap();
     let mut count = 0;
     for guest in invitation.open::<f32>(&world.assembly, &workers).unwrap() {
@@ -78,6 +91,7 @@ fn agree_on_the_soup(invitation: &Invitation, threads: usize) -> std::result::Re
                 workers.pass(scalar, &world, &batches, &mut ours);
                 let hits = ours.hit_count();
                 assert!(hits > 1000 && hits < 2600, "{hits} hits test little");
+                assert!(every_instance_is_seen(&ours, world.instances.len()));
                 // Twice: rays are packed anew although the first pass used them up.
                 for _ in 0..2 {
                     let mut theirs = Answers::new(query, &batches);
@@ -91,6 +105,11 @@ fn agree_on_the_soup(invitation: &Invitation, threads: usize) -> std::result::Re
         }
     }
     Ok(count)
+}
+
+fn every_instance_is_seen(answers: &Answers<f32>, count: usize) -> bool {
+    let Answers::Closest(batches) = answers else { return true };
+    (0..count as u32).all(|inst| batches.iter().any(|hits| hits.inst[..hits.len()].contains(&inst)))
 }
 
 /// u and v mean the same for both.
@@ -109,15 +128,16 @@ fn same_weights(ours: &Answers<f32>, theirs: &Answers<f32>, what: &str) {
 fn obvhs_finds_what_scalar_finds() {
     let invitation = Invitation { names: vec!["obvhs".into()], embree: None };
     for threads in [1, 3] {
-        assert_eq!(agree_on_the_soup(&invitation, threads), Ok(2));
+        assert_eq!(agree(&soup(), &invitation, threads), Ok(2));
     }
+    assert_eq!(agree(&instances(), &invitation, 1), Ok(2));
 }
 
 #[test]
 fn every_mode_of_embree_finds_what_scalar_finds() {
     let invitation = Invitation { names: vec!["embree".into(), "embree-robust".into()], embree: None };
-    for threads in [1, 2] {
-        match agree_on_the_soup(&invitation, threads) {
+    for (scene, threads) in [(soup(), 1), (soup(), 2), (instances(), 1), (instances(), 2)] {
+        match agree(&scene, &invitation, threads) {
             Ok(count) => assert_eq!(count, 16),
             // A library that was named must work.
             Err(why) if std::env::var_os(embree::VARIABLE).is_some() => panic!("{why}"),
@@ -163,7 +183,7 @@ fn unknown_peers_are_refused_with_a_suggestion() {
 fn numbers_of_hits_are_renamed_and_misses_left() {
     let mut hits = Hits::<f32>::new(3);
     hits.prim[1] = 1;
-    rename(&[[7, 8], [5, 6]], &mut hits);
+    rename(&mut hits, |prim, _| [[7, 8], [5, 6]].get(prim as usize).copied());
     assert_eq!((hits.prim[1], hits.inst[1]), (5, 6));
     assert!(!hits.is_hit(0) && !hits.is_hit(2));
 }

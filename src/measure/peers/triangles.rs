@@ -1,17 +1,20 @@
-//! A world's triangles in world space, f32, as peers want them: no instances, no shapes.
+//! A world's triangles, f32, as peers want them: all in world space, or, for peers that know instances, objects that are
+//! placed several times once in their own space. No shapes.
 
 use glam::{DAffine3, DVec3};
 
-use crate::scene::assembly::{Assembly, Part, PartKind, Placement};
+use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind};
 use crate::scene::mesh::Mesh;
 use crate::shape::Triangle;
 
-/// Most triangles, counted once per instance, that a peer is given: its trees take up to 300 bytes for each.
+/// Most triangles (counted once per instance, for peers without instances) and instances together that a peer is given:
+/// its trees take up to 300 bytes for each.
 pub const MAX_TRIANGLES: u64 = 12_000_000;
 
-/// Indexed triangles with our numbers for them. Triangles that our engines drop (no area, not finite) are left out.
+/// Indexed triangles of one space with our numbers for them. Triangles that our engines drop (no area, not finite) are
+/// left out.
 #[derive(Clone, Debug, Default)]
-pub struct WorldTriangles {
+pub struct Triangles {
     /// Vertices: x, y, z and a fourth number that makes the stride 16 bytes, as Embree's vector loads want it.
     pub vertices: Vec<[f32; 4]>,
     /// Vertex numbers of each triangle.
@@ -20,38 +23,35 @@ pub struct WorldTriangles {
     pub ids: Vec<[u32; 2]>,
 }
 
-impl WorldTriangles {
-    /// All triangles of all instances.
+impl Triangles {
+    /// All triangles of all instances, in world space.
     ///
     /// # Errors
     /// Why peers cannot have this scene: analytic shapes, no triangles, or more than [`MAX_TRIANGLES`].
     pub fn flatten(assembly: &Assembly) -> Result<Self, String> {
-        let parts = || assembly.objects.iter().flat_map(|object| &object.parts);
-        let shapes = parts().filter(|part| !matches!(part.kind, PartKind::Mesh(_))).count();
-        if shapes > 0 {
-            return Err(format!("the scene has {shapes} analytic shapes, peers get triangles only"));
-        }
+        refuse_shapes(assembly)?;
         let count = assembly.instanced_prims();
-        let vertices: u64 = assembly.placements.iter().map(|p| vertices_of(assembly, p)).sum();
-        if count > MAX_TRIANGLES || vertices > 3 * MAX_TRIANGLES {
-            let what = format!("{count} triangles with {vertices} vertices over all instances");
-            return Err(format!("{what}, peers get at most {MAX_TRIANGLES} and three times as many"));
-        }
+        let vertices = assembly.placements.iter().map(|p| vertices_of(&assembly.objects[p.object as usize])).sum();
+        refuse_many(count, vertices, "triangles over all instances")?;
         let mut all = Self::default();
         for (inst, placement) in assembly.placements.iter().enumerate() {
-            for part in &assembly.objects[placement.object as usize].parts {
-                if let PartKind::Mesh(mesh) = &part.kind {
-                    all.add(part, mesh, placement, inst as u32);
-                }
-            }
+            all.add_object(&assembly.objects[placement.object as usize], &placement.to_world, inst as u32);
         }
-        if all.indices.is_empty() { Err("the scene has no triangles".into()) } else { Ok(all) }
+        if all.indices.is_empty() { Err(NONE.into()) } else { Ok(all) }
     }
 
-    fn add(&mut self, part: &Part, mesh: &Mesh, placement: &Placement, inst: u32) {
+    fn add_object(&mut self, object: &AssemblyObject, to_space: &DAffine3, inst: u32) {
+        for part in &object.parts {
+            if let PartKind::Mesh(mesh) = &part.kind {
+                self.add(part, mesh, to_space, inst);
+            }
+        }
+    }
+
+    fn add(&mut self, part: &Part, mesh: &Mesh, to_space: &DAffine3, inst: u32) {
         let base = self.vertices.len() as u32;
         let local = |p: DVec3| placed(&part.to_object, p);
-        self.vertices.extend(mesh.positions.iter().map(|&p| rounded(placed(&placement.to_world, local(p)))));
+        self.vertices.extend(mesh.positions.iter().map(|&p| rounded(placed(to_space, local(p)))));
         for (i, triangle) in mesh.triangles.iter().enumerate() {
             let corners = triangle.map(|v| self.vertices[(base + v) as usize]);
             let kept = Triangle::record::<f32>(mesh.corners(i).map(local)).is_ok();
@@ -68,13 +68,91 @@ impl WorldTriangles {
     }
 }
 
-fn vertices_of(assembly: &Assembly, placement: &Placement) -> u64 {
-    let parts = &assembly.objects[placement.object as usize].parts;
+/// A world for peers that know instances: what is placed once stands in world space, as in a world without instances;
+/// what is placed several times is kept once, in its own space.
+#[derive(Clone, Debug, Default)]
+pub struct PlacedTriangles {
+    /// Triangles of all objects that are placed once, in world space.
+    pub world: Triangles,
+    /// Objects that are placed several times, in object space; their instance numbers mean nothing.
+    pub objects: Vec<Triangles>,
+    /// Where those are placed.
+    pub instances: Vec<PlacedObject>,
+}
+
+/// One of several placements of an object.
+#[derive(Clone, Copy, Debug)]
+pub struct PlacedObject {
+    /// Index into [`PlacedTriangles::objects`].
+    pub object: u32,
+    /// Our instance number.
+    pub inst: u32,
+    /// Object space to world space: three columns and the translation.
+    pub to_world: [f32; 12],
+}
+
+impl PlacedTriangles {
+    /// The triangles of a world.
+    ///
+    /// # Errors
+    /// Those of [`Triangles::flatten`], where [`MAX_TRIANGLES`] is for stored triangles and instances together.
+    pub fn of(assembly: &Assembly) -> Result<Self, String> {
+        refuse_shapes(assembly)?;
+        let mut placements = vec![0u64; assembly.objects.len()];
+        assembly.placements.iter().for_each(|p| placements[p.object as usize] += 1);
+        let used = || assembly.objects.iter().zip(&placements).filter(|(_, count)| **count > 0);
+        let repeated: u64 = placements.iter().filter(|count| **count > 1).sum();
+        let count = used().map(|(object, _)| u64::from(object.prim_count)).sum::<u64>() + repeated;
+        refuse_many(count, used().map(|(object, _)| vertices_of(object)).sum(), "triangles and instances")?;
+        let mut all = Self::default();
+        let mut kept = vec![None; assembly.objects.len()];
+        for (inst, placement) in assembly.placements.iter().enumerate() {
+            let at = placement.object as usize;
+            let object = &assembly.objects[at];
+            if placements[at] == 1 {
+                all.world.add_object(object, &placement.to_world, inst as u32);
+                continue;
+            }
+            let number = *kept[at].get_or_insert_with(|| {
+                let mut triangles = Triangles::default();
+                triangles.add_object(object, &DAffine3::IDENTITY, 0);
+                all.objects.push(triangles);
+                all.objects.len() as u32 - 1
+            });
+            let to_world = placement.to_world.to_cols_array().map(|x| x as f32);
+            let finite = to_world.iter().all(|x| x.is_finite());
+            if finite && !all.objects[number as usize].indices.is_empty() {
+                all.instances.push(PlacedObject { object: number, inst: inst as u32, to_world });
+            }
+        }
+        if all.world.indices.is_empty() && all.instances.is_empty() { Err(NONE.into()) } else { Ok(all) }
+    }
+}
+
+/// Why there is nothing to trace.
+const NONE: &str = "the scene has no triangles";
+
+fn refuse_shapes(assembly: &Assembly) -> Result<(), String> {
+    let parts = assembly.objects.iter().flat_map(|object| &object.parts);
+    match parts.filter(|part| !matches!(part.kind, PartKind::Mesh(_))).count() {
+        0 => Ok(()),
+        shapes => Err(format!("the scene has {shapes} analytic shapes, peers get triangles only")),
+    }
+}
+
+fn refuse_many(count: u64, vertices: u64, what: &str) -> Result<(), String> {
+    if count <= MAX_TRIANGLES && vertices <= 3 * MAX_TRIANGLES {
+        return Ok(());
+    }
+    Err(format!("{count} {what} with {vertices} vertices, peers get at most {MAX_TRIANGLES} and three times as many"))
+}
+
+fn vertices_of(object: &AssemblyObject) -> u64 {
     let of_part = |part: &Part| match &part.kind {
         PartKind::Mesh(mesh) => mesh.positions.len() as u64,
         PartKind::Shape(_) | PartKind::Solids(_) => 0,
     };
-    parts.iter().map(of_part).sum()
+    object.parts.iter().map(of_part).sum()
 }
 
 /// An identity must not cost the file's last bits.
@@ -117,17 +195,30 @@ mod tests {
 
     #[test]
     fn instances_become_triangles_with_their_numbers() {
-        let all = WorldTriangles::flatten(&Assembly::new(&scene()).unwrap()).unwrap();
+        let all = Triangles::flatten(&Assembly::new(&scene()).unwrap()).unwrap();
         assert_eq!(all.ids, [[1, 0], [1, 1]]);
         assert_eq!(all.corners(0), [[1.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]]);
         assert_eq!(all.corners(1), [[2.0, 0.0, 0.0, 0.0], [4.0, 0.0, 0.0, 0.0], [2.0, 2.0, 0.0, 0.0]]);
+    }
+
+    /// Placed twice, so kept once: our numbers, the corners as they are in the object, two maps.
+    #[test]
+    fn what_is_placed_twice_is_kept_once() {
+        let mut scene = scene();
+        scene.groups[0].items.push(item(ItemKind::Mesh(0), DAffine3::from_translation(DVec3::Z)));
+        let all = PlacedTriangles::of(&Assembly::new(&scene).unwrap()).unwrap();
+        assert_eq!((&all.world.ids[..], all.objects.len()), (&[[1, 0]][..], 1), "the root's own is placed once");
+        assert_eq!(all.world.corners(0)[1], [1.0, 0.0, 1.0, 0.0]);
+        assert_eq!((all.objects[0].ids.len(), all.objects[0].corners(0)[0]), (1, [1.0, 0.0, 0.0, 0.0]));
+        assert_eq!(all.instances.iter().map(|i| (i.object, i.inst)).collect::<Vec<_>>(), [(0, 1), (0, 2)]);
+        assert_eq!(all.instances[1].to_world, [2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0]);
     }
 
     #[test]
     fn shapes_are_refused_in_words() {
         let mut scene = scene();
         scene.groups[1].items.push(item(ItemKind::Shape(Shape::Sphere), DAffine3::IDENTITY));
-        let why = WorldTriangles::flatten(&Assembly::new(&scene).unwrap()).unwrap_err();
+        let why = Triangles::flatten(&Assembly::new(&scene).unwrap()).unwrap_err();
         assert!(why.contains("1 analytic shapes"), "{why}");
     }
 
@@ -139,7 +230,9 @@ mod tests {
             scene.groups.push(Group { items: twice.into(), ..Default::default() });
         }
         scene.groups[0].items = vec![item(ItemKind::Instance(24), DAffine3::IDENTITY)];
-        let why = WorldTriangles::flatten(&Assembly::new(&scene).unwrap()).unwrap_err();
-        assert!(why.contains("at most 12000000"), "{why}");
+        let assembly = Assembly::new(&scene).unwrap();
+        for why in [Triangles::flatten(&assembly).unwrap_err(), PlacedTriangles::of(&assembly).unwrap_err()] {
+            assert!(why.contains("at most 12000000"), "{why}");
+        }
     }
 }

@@ -6,8 +6,9 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use super::facets::Facets;
+use super::rounding::Rounding;
 use super::runs::Runs;
-use super::{Class, Counts, Instance, Object, PlacedSolid, World, solids, successor};
+use super::{Class, Counts, Instance, Kinds, Object, PlacedSolid, World, solids, successor};
 use crate::bvh::{self, BuildSettings, LEAF_PRIMS, Leaf, Preset, Tree};
 use crate::error::Result;
 use crate::lanes::Real;
@@ -57,17 +58,24 @@ impl<S: Real> World<S> {
             counts.push(count);
         }
         let instances: Vec<_> = assembly.placements.iter().map(|p| instance(p, &objects)).collect();
-        let (top, top_blocks, unbounded_instances) = upper_tree(&instances, settings.preset);
+        let (top, top_leaves, unbounded_instances) = upper_tree(&instances, settings.preset);
         let runs: Vec<Runs> = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
         let facets = assembly.objects.iter().zip(&runs).map(|(o, runs)| Facets::new(o, runs)).collect();
+        let rounding = Rounding::of(&assembly.placements, &objects);
+        let kinds = objects
+            .iter()
+            .map(Object::kinds)
+            .fold(Kinds::default(), |a, b| Kinds { shapes: a.shapes || b.shapes, others: a.others || b.others });
         let build_seconds = start.elapsed().as_secs_f64();
         Ok(Self {
             assembly,
             objects,
             instances,
             top,
-            top_blocks,
+            top_leaves,
             unbounded_instances,
+            rounding,
+            kinds,
             runs,
             facets,
             counts,
@@ -279,7 +287,7 @@ fn instance<S: Real>(placement: &Placement, objects: &[Object<S>]) -> Instance<S
     Instance { object: placement.object, identity, to_local, bounds: world }
 }
 
-type UpperTree<S> = (Tree<S>, Vec<[u32; LEAF_PRIMS]>, Vec<u32>);
+type UpperTree<S> = (Tree<S>, Vec<u32>, Vec<u32>);
 
 fn upper_tree<S: Real>(instances: &[Instance<S>], preset: Preset) -> UpperTree<S> {
     let bounded = |i: &u32| instances[*i as usize].bounds.is_bounded();
@@ -291,16 +299,8 @@ fn upper_tree<S: Real>(instances: &[Instance<S>], preset: Preset) -> UpperTree<S
         return (Tree::empty(), Vec::new(), unbounded);
     }
     let boxes: Vec<_> = ids.iter().map(|&i| instances[i as usize].bounds).collect();
-    let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], preset);
-    let blocks = leaves
-        .iter()
-        .map(|leaf| {
-            let mut block = [u32::MAX; LEAF_PRIMS];
-            for (slot, &p) in block.iter_mut().zip(&leaf.prims) {
-                *slot = ids[p as usize];
-            }
-            block
-        })
-        .collect();
-    (tree, blocks, unbounded)
+    // To enter an instance costs more than to open a node: each has a box of its own among eight.
+    let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], BuildSettings { preset, leaf: 1 });
+    let leaves = leaves.iter().flat_map(|leaf| &leaf.prims).map(|&p| ids[p as usize]).collect();
+    (tree, leaves, unbounded)
 }

@@ -5,6 +5,7 @@
 
 mod compile;
 mod facets;
+mod rounding;
 mod runs;
 mod solids;
 mod successor;
@@ -14,6 +15,7 @@ use glam::DVec3;
 
 pub use crate::bvh::{BuildSettings, Preset};
 pub use facets::Met;
+pub use rounding::Rounding;
 pub use surface::Surface;
 
 use self::facets::Facets;
@@ -108,6 +110,15 @@ pub struct PlacedSolid<S> {
     pub first_prim: u32,
 }
 
+/// What there is besides triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Kinds {
+    /// Shapes with bounds.
+    pub shapes: bool,
+    /// Half-spaces or trees of solids.
+    pub others: bool,
+}
+
 /// An object placed in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Instance<S> {
@@ -130,12 +141,16 @@ pub struct World<S> {
     pub objects: Vec<Object<S>>,
     /// Instances, parallel to the assembly's placements.
     pub instances: Vec<Instance<S>>,
-    /// Tree over bounded instances; a leaf block holds instance numbers ([`World::top_blocks`]).
+    /// Tree over bounded instances, one in a leaf ([`World::top_leaves`]).
     pub top: Tree<S>,
     /// Instance numbers of the upper tree's leaves.
-    pub top_blocks: Vec<[u32; crate::bvh::LEAF_PRIMS]>,
+    pub top_leaves: Vec<u32>,
     /// Instances without bounds.
     pub unbounded_instances: Vec<u32>,
+    /// What instances' maps do to rounding errors.
+    pub rounding: Rounding,
+    /// What objects are made of, taken together.
+    pub kinds: Kinds,
     /// Per object: its runs.
     runs: Vec<Runs>,
     /// Per object: normals of its shapes and solids.
@@ -190,6 +205,12 @@ impl<S: Real> World<S> {
     /// Whether the world is one object in its own space, traced without the upper tree.
     pub fn is_single_object(&self) -> bool {
         matches!(&self.instances[..], [only] if only.identity)
+    }
+
+    /// The object of the first instance; there must be one.
+    #[inline(always)]
+    pub fn first_object(&self) -> &Object<S> {
+        &self.objects[self.instances[0].object as usize]
     }
 
     /// Whether shapes and solids make up more of the objects than triangles do, block by block.
@@ -256,7 +277,7 @@ impl<S: Real> World<S> {
         stats.leaves += q.leaves as u64;
         stats.depth = stats.depth.max(self.top.depth);
         stats.node_bytes += size_of_val(&self.top.nodes[..]) as u64;
-        stats.prim_bytes += (size_of_val(&self.instances[..]) + size_of_val(&self.top_blocks[..])) as u64;
+        stats.prim_bytes += (size_of_val(&self.instances[..]) + size_of_val(&self.top_leaves[..])) as u64;
         stats
     }
 }
@@ -269,6 +290,12 @@ impl<S: Real> Object<S> {
             + placed
             + size_of_val(&self.unbounded[..])
             + self.solids.iter().map(|s| s.solid.bytes()).sum::<usize>()
+    }
+
+    /// What it is made of.
+    pub fn kinds(&self) -> Kinds {
+        let shapes = !self.spheres.is_empty() || self.placed.iter().any(|list| !list.is_empty());
+        Kinds { shapes, others: !self.unbounded.is_empty() || !self.solids.is_empty() }
     }
 
     /// Whether something in it has no bounds, and so no place in the tree.

@@ -89,11 +89,10 @@ impl<S: Real> Walk<'_, S> {
         }
         let top = &world.top;
         let fetch =
-            |child: Child| prefetch_either(&top.nodes, &world.top_blocks, child.is_leaf(), child.index as usize);
+            |child: Child| prefetch_either(&top.nodes, &world.top_leaves, child.is_leaf(), child.index as usize);
         self.tree::<V, ANY, COUNT>(top, chunk, all, octant, &fetch, |walk, leaf, rays| {
-            for &inst in &world.top_blocks[leaf.index as usize][..usize::from(leaf.count)] {
-                walk.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, rays);
-            }
+            let inst = world.top_leaves[leaf.index as usize];
+            walk.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, rays);
         });
         for &inst in &world.unbounded_instances {
             self.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, all);

@@ -21,8 +21,9 @@
 //! formula, ray by ray ([`super::exact`]). So a tile's answers are those of the scalar engine, bit by bit.
 
 use super::groups::{Groups, splats};
+use super::place::Place;
 use super::{HALF_ULP, V, select};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, f32x8, map3};
 use crate::shape::Block;
 
 /// Triangles set up together.
@@ -55,9 +56,16 @@ const WILD: f32 = 0.25;
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub struct Batch {
+    /// In the space of the geometry; of instances: in the frame.
     corners: [[f32; BATCH + 8]; 9],
+    /// Of instances, any-hit: the first corner and the two sides that leave it, in the world and the scale of the frame.
+    side: [[f32; BATCH + 8]; 9],
     /// Primitive number; `EXACT`: block * 8 + place.
     pub id: [u32; BATCH + 8],
+    /// Of instances: the instance.
+    pub inst: [u32; BATCH + 8],
+    /// Of instances: block * 8 + place.
+    pub slot: [u32; BATCH + 8],
     /// Groups that met the leaf.
     pub groups: [u64; BATCH + 8],
     len: usize,
@@ -65,7 +73,9 @@ pub struct Batch {
 
 impl Default for Batch {
     fn default() -> Self {
-        Self { corners: [[0.0; BATCH + 8]; 9], id: [0; BATCH + 8], groups: [0; BATCH + 8], len: 0 }
+        let numbers = [0; BATCH + 8];
+        let reals = [[0.0; BATCH + 8]; 9];
+        Self { corners: reals, side: reals, id: numbers, inst: numbers, slot: numbers, groups: [0; BATCH + 8], len: 0 }
     }
 }
 
@@ -130,6 +140,36 @@ impl Batch {
         self.len = at + count;
     }
 
+    /// Adds the first `count` triangles of a block of an instance, mapped into the frame: triangles of several instances
+    /// are set up together.
+    #[inline(always)]
+    pub fn push_placed<const ANY: bool>(
+        &mut self,
+        block: &Block<f32, 9>,
+        first_slot: u32,
+        count: usize,
+        groups: u64,
+        place: &Place,
+    ) {
+        let at = self.len.min(BATCH);
+        let corners: [Lanes3<f32x8>; 3] = each(|i| each(|a| f32x8::load(&block.fields[3 * i + a])));
+        let apex = map3(place.frame.apex, f32x8::splat);
+        for (i, corner) in corners.iter().enumerate() {
+            let seen = place.frame.coordinates(each(|a| corner[a] - apex[a]));
+            seen.iter().enumerate().for_each(|(a, x)| x.store(&mut self.corners[3 * i + a][at..]));
+        }
+        if ANY {
+            let sides = [1, 2].map(|i| place.to_world.vectors::<f32x8>(each(|a| corners[i][a] - corners[0][a])));
+            let numbers = [place.to_world.points(corners[0]), sides[0], sides[1]];
+            self.side.iter_mut().zip(numbers.iter().flatten()).for_each(|(to, x)| x.store(&mut to[at..]));
+        }
+        self.id[at..at + 8].copy_from_slice(&block.prim);
+        self.inst[at..at + 8].fill(place.inst);
+        self.slot[at..at + 8].copy_from_slice(&std::array::from_fn::<u32, 8, _>(|i| first_slot + i as u32));
+        self.groups[at..at + 8].fill(groups);
+        self.len = at + count;
+    }
+
     /// Corners of a waiting triangle.
     pub fn corners(&self, i: usize) -> [f32; 9] {
         std::array::from_fn(|f| self.corners[f][i])
@@ -140,8 +180,8 @@ impl Batch {
     pub fn set_up<const ANY: bool, const EXACT: bool>(&self, groups: &Groups, planes: &mut Planes) -> u32 {
         let apex = map3(groups.frame.apex, V::splat);
         let p: [Lanes3<V>; 3] = each(|i| {
-            let corner = each(|a| V::load(&self.corners[3 * i + a]) - apex[a]);
-            groups.frame.coordinates(corner)
+            let corner = each(|a| V::load(&self.corners[3 * i + a]));
+            if !EXACT && groups.many { corner } else { groups.frame.coordinates(each(|a| corner[a] - apex[a])) }
         });
         let (d1, d2) = (minus(p[1], p[0]), minus(p[2], p[0]));
         if !EXACT {
@@ -171,6 +211,18 @@ impl Batch {
         planes.store(groups, &linear, eps, |inverse| inverse * most) & ((1u32 << self.len) - 1)
     }
 
+    /// The first corner and the two sides that leave it, in the world and the scale of the frame.
+    #[inline(always)]
+    fn sides(&self, groups: &Groups) -> (Lanes3<V>, [Lanes3<V>; 2]) {
+        if groups.many {
+            let [corner, one, other] = each(|i| each(|a| V::load(&self.side[3 * i + a])));
+            return (corner, [one, other]);
+        }
+        let scale = V::splat(groups.frame.scale);
+        let corner: [Lanes3<V>; 3] = each(|i| each(|a| V::load(&self.corners[3 * i + a]) * scale));
+        (corner[0], [minus(corner[1], corner[0]), minus(corner[2], corner[0])])
+    }
+
     /// Set-up for the tile's own answers.
     #[inline(always)]
     fn set_up_own<const ANY: bool>(
@@ -186,10 +238,9 @@ impl Batch {
         let back = volume.cmp_lt(zero);
         let faced = |x: V| select(back, -x, x);
         if ANY {
-            let scale = V::splat(groups.frame.scale);
-            let corner = each(|i| each(|a| V::load(&self.corners[3 * i + a]) * scale));
-            let away = map3(cross_accurate(minus(corner[1], corner[0]), minus(corner[2], corner[0])), faced);
-            let side = corner[0].into_iter().chain(away);
+            let (corner, sides) = self.sides(groups);
+            let away = map3(cross_accurate(sides[0], sides[1]), faced);
+            let side = corner.into_iter().chain(away);
             planes.side.iter_mut().zip(side).for_each(|(to, x)| x.store(to));
         }
         let (edges, eps) = own_edges(groups, p);

@@ -7,7 +7,7 @@ use super::{Mask, V, select};
 use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes, each};
 use crate::ray::{Candidate, HitPacket, INVALID_ID, Packet};
-use crate::scene::world::Object;
+use crate::scene::world::{Object, World};
 use crate::shape::Triangle;
 
 /// What the common formula needs: the rays as they came and the triangles as they are stored.
@@ -15,7 +15,9 @@ use crate::shape::Triangle;
 pub struct Exact<'a> {
     /// The rays.
     pub bundle: &'a Bundle<'a>,
-    /// The triangles.
+    /// What is traced.
+    pub world: &'a World<f32>,
+    /// The triangles, if the world is one object.
     pub object: &'a Object<f32>,
 }
 

@@ -2,11 +2,14 @@
 //!
 //! A ray becomes two numbers (s, t) = (d.u, d.v) / (d.a), a point P becomes (x, y, z) = (P.u, P.v, P.a), and the ray
 //! passes the point where x = s z and y = t z. Any three independent axes would do: rays and triangles go through
-//! the same map, so only the rounding of the map matters, not how perpendicular its axes are.
+//! the same map, so only the rounding of the map matters, not how perpendicular its axes are. That is also how tiles go
+//! through instances ([`super::place`]).
+
+use glam::{DAffine3, DVec3};
 
 use super::bundle::{Bundle, Shared};
 use super::{Mask, SET, V, select};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot, map3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::math::Aabb;
 
 /// Scales of scenes the tile's arithmetic is made for: products of three coordinates, scaled, stay normal numbers.
@@ -19,7 +22,7 @@ pub struct Frame {
     pub apex: [f32; 3],
     /// Right, up, depth.
     pub axes: [[f32; 3]; 3],
-    /// Power of two that the axes carry.
+    /// Power of two that the axes carry (in world space).
     pub scale: f32,
     /// Largest coordinate of the scene as seen from the apex, any axis, before scaling.
     pub extent: f32,
@@ -31,8 +34,7 @@ impl Frame {
     #[inline(always)]
     pub fn of<const N: usize>(bundle: &Bundle, groups: u64, bounds: &Aabb<f32>) -> Option<Self> {
         let apex = bundle.apex;
-        let reach = |a: usize| (bounds.lo[a] - apex[a]).abs().max((bounds.hi[a] - apex[a]).abs());
-        let extent = reach(0).max(reach(1)).max(reach(2));
+        let extent = reach(bounds, apex);
         let exponent = ((extent.to_bits() >> 23) as i32) - 127;
         if !EXPONENTS.contains(&exponent) {
             return None;
@@ -96,11 +98,32 @@ impl Frame {
         sums
     }
 
+    /// This frame in the space of an object that `to_world` places: coordinates of points, and so depths, are the same
+    /// there. `bounds` is the object's box.
+    #[inline(always)]
+    pub fn through(&self, to_world: &DAffine3, bounds: &Aabb<f32>) -> Self {
+        let m = to_world.matrix3;
+        let apex = DVec3::from(self.apex.map(f64::from)) - to_world.translation;
+        let apex = (m.inverse() * apex).to_array().map(|x| x as f32);
+        let axes = map3(self.axes, |axis| {
+            let axis = DVec3::from(axis.map(f64::from));
+            [m.x_axis.dot(axis) as f32, m.y_axis.dot(axis) as f32, m.z_axis.dot(axis) as f32]
+        });
+        Self { apex, axes, scale: self.scale, extent: reach(bounds, apex) }
+    }
+
     /// Vectors in this frame.
     #[inline(always)]
-    pub fn coordinates(&self, d: Lanes3<V>) -> Lanes3<V> {
-        map3(self.axes, |axis| dot(d, map3(axis, V::splat)))
+    pub fn coordinates<L: Lanes<Scalar = f32>>(&self, d: Lanes3<L>) -> Lanes3<L> {
+        map3(self.axes, |axis| dot(d, map3(axis, L::splat)))
     }
+}
+
+/// Largest coordinate of a box as seen from the apex.
+#[inline(always)]
+fn reach(bounds: &Aabb<f32>, apex: [f32; 3]) -> f32 {
+    let [x, y, z] = each(|a| (bounds.lo[a] - apex[a]).abs().max((bounds.hi[a] - apex[a]).abs()));
+    x.max(y).max(z)
 }
 
 fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

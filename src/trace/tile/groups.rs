@@ -5,7 +5,7 @@ use super::frame::Frame;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::words::{least, row_minima};
 use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
-use crate::math::Aabb;
+use crate::scene::world::World;
 
 /// Widest tile: |s| and |t| below this (83 degrees off the axis).
 const WIDEST: f32 = 8.0;
@@ -62,6 +62,10 @@ impl Default for Group {
 pub struct Groups {
     /// The groups.
     pub of: [Group; GROUPS],
+    /// The world is made of instances.
+    pub many: bool,
+    /// In such worlds: instance of the best hit, or [`NO_SLOT`].
+    pub inst: [[u32; 16]; GROUPS],
     /// Some segment ends before the common point.
     pub ends_early: bool,
     /// Per group, sixteen in the lanes of a vector: least and greatest s, least and greatest t.
@@ -93,6 +97,8 @@ impl Default for Groups {
         let zero = [V::splat(0.0); SETS];
         Self {
             of: [Group::default(); GROUPS],
+            many: false,
+            inst: [[NO_SLOT; 16]; GROUPS],
             ends_early: false,
             rect: [[zero; 2]; 2],
             part: [[zero; 2]; 2],
@@ -126,12 +132,22 @@ struct Lines {
 }
 
 impl Groups {
-    /// Takes in some groups of the first `N` sets of a bundle. False if they spread too wide for one frame (nothing is
-    /// traced then).
+    /// Takes in some groups of the first `N` sets of a bundle that looks at `world`. False if they spread too wide for one
+    /// frame (nothing is traced then).
     #[inline(always)]
-    pub fn load<const N: usize, const EXACT: bool>(&mut self, bundle: &Bundle, groups: u64, scene: &Aabb<f32>) -> bool {
+    pub fn load<const N: usize, const EXACT: bool>(
+        &mut self,
+        bundle: &Bundle,
+        groups: u64,
+        world: &World<f32>,
+    ) -> bool {
+        self.many = !world.is_single_object();
+        let scene = if self.many { &world.top.bounds } else { &world.first_object().tree.bounds };
         let Some(frame) = Frame::of::<N>(bundle, groups, scene) else { return false };
         self.frame = frame;
+        if self.many {
+            self.inst[..N * SET].fill([NO_SLOT; 16]);
+        }
         let most = V::splat(f32::INFINITY);
         let (mut near, mut reach) = (most, V::splat(0.0));
         for q in 0..N {

@@ -4,8 +4,10 @@
 //! triangles are set up once per tile, and a ray's share of a triangle test is four linear functions of its two
 //! coordinates. `tile` answers with that arithmetic ([`own`]; [`batch`] states its accuracy). In `tile-exact` the common
 //! formula decides where rounding could matter, so its hits are those of the other engines, bit by bit ([`exact`]).
-//! Blocks of rays without a common point and worlds with more than one mesh object go to the stream kernel
-//! ([`super::stream`]), single odd rays to the packet kernel.
+//! Instances are entered by taking the tile's frame through their maps ([`place`]); shapes in them are tested ray by ray
+//! ([`shapes`]). To the stream kernel ([`super::stream`]) go blocks of rays without a common point, and worlds with solids,
+//! with more shapes than triangles, or with maps too flat for f32; for `tile-exact` also all worlds with instances. Single
+//! odd rays go to the packet kernel.
 //!
 //! Sources: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm", 2005; Wald, Boulos, Shirley, "Ray tracing
 //! deformable scenes using dynamic bounding volume hierarchies", 2007; Fuetterling, Lojewski, Pfreundt, Ebert,
@@ -19,6 +21,8 @@ mod groups;
 mod node;
 mod own;
 mod pairs;
+mod place;
+mod shapes;
 mod slab;
 mod walk;
 
@@ -27,7 +31,7 @@ use super::query::{Query, Stack};
 use super::{Engine, Generic, Scratch, stream, traverse};
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
-use crate::scene::world::{Class, Object, World};
+use crate::scene::world::{Object, World};
 use bundle::Bundle;
 use exact::Exact;
 
@@ -59,7 +63,7 @@ const BLOCK: usize = GROUPS * V::N;
 const HALF_ULP: f32 = f32::EPSILON / 2.0;
 
 /// Working memory of the engine.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Memory {
     groups: groups::Groups,
     batch: batch::Batch,
@@ -67,6 +71,8 @@ pub struct Memory {
     pairs: pairs::Pairs,
     slabs: slab::Slabs,
     levels: Vec<node::Level>,
+    /// For leaves of shapes.
+    stack: Stack<f32>,
     /// Where groups start that are for the stream kernel.
     rest: Vec<usize>,
 }
@@ -108,24 +114,27 @@ struct Job<'a> {
     most: usize,
 }
 
-/// The object of a world that tiles can trace: one object in world space, of triangles only.
-fn mesh(world: &World<f32>) -> Option<&Object<f32>> {
-    if !world.is_single_object() {
-        return None;
-    }
-    let object = &world.objects[world.instances[0].object as usize];
-    let others = object.spheres.len() + object.unbounded.len() + object.placed.iter().map(Vec::len).sum::<usize>();
-    let others = others + object.solids.len();
+/// Whether tiles can trace a world: one object in world space, of triangles only; or (not for `exact` tiles) instances
+/// of more triangles than shapes, that no map makes too flat.
+fn suits(world: &World<f32>, exact: bool) -> bool {
     // Triangles are numbered by block and place in 32 bits.
-    let fits = object.triangles.len() < (u32::MAX / 8) as usize;
-    (others == 0 && fits && matches!(Class::ALL[0], Class::Triangle)).then_some(object)
+    let fits = |object: &Object<f32>| object.triangles.len() < (u32::MAX / 8) as usize;
+    let shape = match world.is_single_object() {
+        true => !world.kinds.shapes,
+        false => {
+            let steep = world.rounding.growth <= place::MOST_GROWTH;
+            !exact && steep && !world.top.nodes.is_empty() && !(world.kinds.shapes && world.is_of_shapes())
+        }
+    };
+    shape && !world.kinds.others && world.objects.iter().all(fits)
 }
 
 impl Job<'_> {
     fn run<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self) {
-        let object = mesh(self.world);
-        if let Some(object) = object {
-            let depth = object.tree.depth as usize + 1;
+        let suits = suits(self.world, EXACT);
+        if suits {
+            let below = self.world.objects.iter().map(|object| object.tree.depth).max().unwrap_or(0);
+            let depth = (self.world.top.depth + below) as usize + 1;
             if self.memory.levels.len() < depth {
                 self.memory.levels.resize(depth, node::Level::default());
             }
@@ -133,19 +142,19 @@ impl Job<'_> {
         // What one call learns must not change what another one answers.
         self.memory.slabs.forget();
         for first in (0..self.rays.len()).step_by(BLOCK) {
-            let Some(object) = object else {
+            if !suits {
                 self.leave::<SETS>(first);
                 continue;
-            };
+            }
             if self.most == GROUPS
                 && let Some(bundle) = Bundle::find::<SETS>(self.rays, first, ANY)
             {
-                self.block::<ANY, EXACT, COUNT>(object, &bundle);
+                self.block::<ANY, EXACT, COUNT>(&bundle);
                 continue;
             }
             for first in (first..self.rays.len().min(first + BLOCK)).step_by(SET * V::N) {
                 match Bundle::find::<1>(self.rays, first, ANY) {
-                    Some(bundle) => self.block::<ANY, EXACT, COUNT>(object, &bundle),
+                    Some(bundle) => self.block::<ANY, EXACT, COUNT>(&bundle),
                     None => self.leave::<1>(first),
                 }
             }
@@ -167,35 +176,30 @@ impl Job<'_> {
     }
 
     /// Traces a block as one tile or as one for each set.
-    fn block<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, object: &Object<f32>, bundle: &Bundle) {
+    fn block<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &Bundle) {
         let all = bundle.groups();
         for g in (0..bundle.len).filter(|g| all >> g & 1 == 0) {
             self.packet::<ANY, COUNT>(bundle.first + g * V::N);
         }
-        if all >> SET != 0 && self.tile::<SETS, ANY, EXACT, COUNT>(object, bundle, all) {
+        if all >> SET != 0 && self.tile::<SETS, ANY, EXACT, COUNT>(bundle, all) {
             return;
         }
         for q in (0..SETS).filter(|q| all >> (q * SET) & 0xffff != 0) {
-            self.set::<ANY, EXACT, COUNT>(object, &bundle.set(q), all >> (q * SET) & 0xffff);
+            self.set::<ANY, EXACT, COUNT>(&bundle.set(q), all >> (q * SET) & 0xffff);
         }
     }
 
     /// Traces some groups of one set as one tile, or as four or sixteen where its rays spread too wide, or as packets.
-    fn set<const ANY: bool, const EXACT: bool, const COUNT: bool>(
-        &mut self,
-        object: &Object<f32>,
-        bundle: &Bundle,
-        all: u64,
-    ) {
-        if self.most >= SET && self.tile::<1, ANY, EXACT, COUNT>(object, bundle, all) {
+    fn set<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &Bundle, all: u64) {
+        if self.most >= SET && self.tile::<1, ANY, EXACT, COUNT>(bundle, all) {
             return;
         }
         for quarter in [0xf, 0xf0, 0xf00, 0xf000] {
-            if self.most > 1 && self.tile::<1, ANY, EXACT, COUNT>(object, bundle, all & quarter) {
+            if self.most > 1 && self.tile::<1, ANY, EXACT, COUNT>(bundle, all & quarter) {
                 continue;
             }
             for g in (0..SET).filter(|g| (all & quarter) >> g & 1 != 0) {
-                if !self.tile::<1, ANY, EXACT, COUNT>(object, bundle, 1 << g) {
+                if !self.tile::<1, ANY, EXACT, COUNT>(bundle, 1 << g) {
                     self.packet::<ANY, COUNT>(bundle.first + g * V::N);
                 }
             }
@@ -206,17 +210,16 @@ impl Job<'_> {
     #[inline(always)]
     fn tile<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
         &mut self,
-        object: &Object<f32>,
         bundle: &Bundle,
         groups: u64,
     ) -> bool {
         if groups == 0 {
             return true;
         }
-        if !self.memory.groups.load::<N, EXACT>(bundle, groups, &object.tree.bounds) {
+        if !self.memory.groups.load::<N, EXACT>(bundle, groups, self.world) {
             return false;
         }
-        let exact = Exact { bundle, object };
+        let exact = Exact { bundle, world: self.world, object: self.world.first_object() };
         walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
             self.output.prefetch(bundle.first + (g + bundle::AHEAD) * V::N);

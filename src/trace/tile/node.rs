@@ -7,8 +7,9 @@
 //! values is a bound for every group. Source of the idea: Reshetov, Soupikov, Hurley, "Multi-level ray tracing
 //! algorithm", 2005 (frusta over boxes); the interpolation is our own.
 
+use super::frame::Frame;
 use super::groups::Groups;
-use super::{HALF_ULP, SET, V};
+use super::{SET, V};
 use crate::bvh::{Node, WIDTH};
 use crate::lanes::words::{halves, signs, twice, upper_halves, without_key};
 use crate::lanes::{LaneMask, Lanes, each, f32x8, map3};
@@ -16,8 +17,8 @@ use crate::lanes::{LaneMask, Lanes, each, f32x8, map3};
 /// Half a vector: the eight children of a node.
 type Half = f32x8;
 
-/// Rounding errors of a box test, in half ulps of the scene's size times the plane's size; and how far a hit that
-/// the triangle test may accept can lie outside.
+/// Rounding errors of a box test, in half ulps of the scene's size ([`Frame::extent`]) times the plane's size; and how
+/// far a hit that the triangle test may accept can lie outside.
 pub const MARGIN: f32 = 48.0;
 
 /// What node tests need of a tile.
@@ -74,10 +75,10 @@ pub fn key(depth: f32) -> u16 {
 }
 
 impl Planes {
-    /// The planes of a loaded tile.
+    /// The planes of a loaded tile whose frame is `frame` in the space of the boxes. `margin`: how far outside of a box
+    /// its contents may be met, in that space.
     #[inline(always)]
-    pub fn of(groups: &Groups) -> Self {
-        let frame = &groups.frame;
+    pub fn of(groups: &Groups, frame: &Frame, margin: f32) -> Self {
         let [u, v, a] = frame.axes;
         let both = |lo: f32, hi: f32| twice_each(lo, hi);
         let mut planes = Self {
@@ -89,17 +90,16 @@ impl Planes {
             depth_margin: 0.0,
             apex: frame.apex,
         };
-        let unit = MARGIN * HALF_ULP * frame.extent;
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
         for (axis, across) in [u, v].into_iter().enumerate() {
             let normal = groups.bounds[axis].map(|edge| each(|x| across[x] - edge * a[x]));
             planes.normal[axis] = each(|x| both(0.5 * normal[0][x], 0.5 * normal[1][x]));
             planes.size[axis] = map3(planes.normal[axis], V::abs);
             // The tile's edges are rounded differences too: |edge| * |a| belongs to the plane's size.
-            let [lo, hi] = normal.map(|n| unit * (sum(n) + sum(across) + groups.wide * sum(a)));
+            let [lo, hi] = normal.map(|n| margin * (sum(n) + sum(across) + groups.wide * sum(a)));
             planes.margin[axis] = both(lo, hi) + V::splat(groups.slack * (1.0 + groups.wide) * 2.0);
         }
-        planes.depth_margin = unit * sum(a) + groups.slack * 2.0;
+        planes.depth_margin = margin * sum(a) + groups.slack * 2.0;
         planes
     }
 

@@ -3,9 +3,10 @@
 
 use glam::DVec3;
 
-use super::batch::Planes;
+use super::batch::{Batch, Planes};
 use super::exact::Exact;
 use super::groups::{Groups, NO_SLOT, merge};
+use super::shapes;
 use super::{Mask, V, select};
 use crate::lanes::words::{below, positions};
 use crate::lanes::{LaneMask, Lanes, each};
@@ -27,9 +28,46 @@ pub struct Verdict {
     pub doubt: bool,
 }
 
+/// The numbers of a triangle: ties of depth go to the smaller instance, then to the smaller primitive.
+#[derive(Clone, Copy, Debug)]
+pub struct Id {
+    /// Instance.
+    pub inst: u32,
+    /// Primitive.
+    pub prim: u32,
+}
+
+impl Id {
+    /// Lanes of a group that hit nothing yet or something with larger numbers. `MANY`: there are instances.
+    #[inline(always)]
+    pub fn comes_first<const MANY: bool>(self, groups: &Groups, g: usize) -> Mask {
+        let smaller = below(self.prim, &groups.of[g].slot);
+        if !MANY {
+            return Mask::from_bits(smaller);
+        }
+        let inst = &groups.inst[g];
+        Mask::from_bits(below(self.inst, inst) | positions(inst, self.inst) & smaller)
+    }
+
+    /// Names the triangle as what some lanes hit.
+    #[inline(always)]
+    pub fn name<const MANY: bool>(self, groups: &mut Groups, g: usize, hit: Mask) {
+        groups.of[g].slot = merge(hit, self.prim, groups.of[g].slot);
+        if MANY {
+            groups.inst[g] = merge(hit, self.inst, groups.inst[g]);
+        }
+    }
+}
+
 /// One triangle against the rays of one group that share their origin.
 #[inline(always)]
-pub fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: usize, prim: u32) -> Verdict {
+pub fn pair<const ANY: bool, const MANY: bool>(
+    groups: &mut Groups,
+    planes: &Planes,
+    g: usize,
+    i: usize,
+    id: Id,
+) -> Verdict {
     let (inside, maybe, [e0, e1, e2]) = inside(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
     let best = groups.of[g].inv_lo;
@@ -38,10 +76,10 @@ pub fn pair<const ANY: bool>(groups: &mut Groups, planes: &Planes, g: usize, i: 
     if ANY {
         return Verdict { hit: occlude(groups, g, inside & reached), doubt };
     }
-    let nearer = best.cmp_lt(inverse) | Mask::from_bits(below(prim, &groups.of[g].slot));
+    let nearer = best.cmp_lt(inverse) | id.comes_first::<MANY>(groups, g);
     let hit = inside & reached & nearer;
     groups.of[g].inv_lo = select(hit, inverse, best);
-    groups.of[g].slot = merge(hit, prim, groups.of[g].slot);
+    id.name::<MANY>(groups, g, hit);
     let own = |e: V, k: usize| e - V::splat(planes.eps[k][i]);
     let (e0, e1, e2) = (own(e0, 0), own(e1, 1), own(e2, 2));
     let weights = &mut groups.of[g].weights;
@@ -80,12 +118,12 @@ fn behind(groups: &Groups, planes: &Planes, g: usize, i: usize) -> V {
 /// rays.
 #[cold]
 #[inline(never)]
-pub fn pair_doubtful<const ANY: bool>(
+pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     groups: &mut Groups,
     planes: &Planes,
     g: usize,
     i: usize,
-    prim: u32,
+    id: Id,
     to_end: bool,
 ) -> bool {
     let (inside, doubtful, _) = inside(groups, planes, g, i);
@@ -98,7 +136,7 @@ pub fn pair_doubtful<const ANY: bool>(
         maybe = maybe & best.cmp_le(inverse);
     }
     if !ANY {
-        maybe = maybe & (best.cmp_lt(inverse) | Mask::from_bits(below(prim, &groups.of[g].slot)));
+        maybe = maybe & (best.cmp_lt(inverse) | id.comes_first::<MANY>(groups, g));
     }
     let (mut rest, mut hit) = (maybe.bits(), 0);
     let mut weights = groups.of[g].weights.map(V::to_array);
@@ -117,7 +155,7 @@ pub fn pair_doubtful<const ANY: bool>(
         return occlude(groups, g, hit);
     }
     groups.of[g].inv_lo = select(hit, inverse, best);
-    groups.of[g].slot = merge(hit, prim, groups.of[g].slot);
+    id.name::<MANY>(groups, g, hit);
     groups.of[g].weights = weights.map(V::new);
     hit.any()
 }
@@ -157,7 +195,7 @@ fn inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> (Mask, Mask, 
 
 /// Lanes that found something want nothing any more.
 #[inline(always)]
-fn occlude(groups: &mut Groups, g: usize, hit: Mask) -> bool {
+pub fn occlude(groups: &mut Groups, g: usize, hit: Mask) -> bool {
     groups.of[g].inv_lo = select(hit, V::splat(f32::INFINITY), groups.of[g].inv_lo);
     groups.of[g].done |= hit.bits();
     hit.any()
@@ -167,13 +205,28 @@ fn occlude(groups: &mut Groups, g: usize, hit: Mask) -> bool {
 /// the common formula. Whether it was hit.
 #[cold]
 #[inline(never)]
-pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, corners: [f32; 9], prim: u32) -> bool {
-    let (packet, t_max, _) = Packet::<V>::load(exact.bundle.rays, exact.bundle.first + g * V::N);
-    let mut block = Block::empty();
-    block.set(0, corners, prim);
+pub fn decide<const ANY: bool, const MANY: bool>(
+    groups: &mut Groups,
+    exact: &Exact,
+    g: usize,
+    batch: &Batch,
+    i: usize,
+) -> bool {
+    let (id, mut block) = (Id { inst: batch.inst[i], prim: batch.id[i] }, Block::empty());
+    let (packet, t_max, tame) = if MANY {
+        let object = exact.world.instances[id.inst as usize].object;
+        let blocks = &exact.world.objects[object as usize].triangles;
+        let (at, place) = ((batch.slot[i] >> 3) as usize, (batch.slot[i] & 7) as usize);
+        block.set(0, blocks[at].get(place), id.prim);
+        shapes::enter(exact, id.inst, g)
+    } else {
+        block.set(0, batch.corners(i), id.prim);
+        let (packet, t_max, _) = Packet::<V>::load(exact.bundle.rays, exact.bundle.first + g * V::N);
+        (packet, t_max, exact.bundle.tame[g])
+    };
     let one = V::constant(1.0);
     let mut any = false;
-    Triangle::intersect(&packet, t_max, &block, 1, exact.bundle.tame[g], |found, lanes, _| {
+    Triangle::intersect(&packet, t_max, &block, 1, tame, |found, lanes, _| {
         let hit = found.hit & found.t.cmp_le(t_max) & Mask::from_bits(lanes);
         if ANY {
             any |= occlude(groups, g, hit);
@@ -181,10 +234,10 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, cor
         }
         let inverse = (one / (found.t * groups.of[g].speed)).fast_min(V::splat(f32::MAX));
         let best = groups.of[g].inv_lo;
-        let tie = best.cmp_eq(inverse) & Mask::from_bits(below(prim, &groups.of[g].slot));
+        let tie = best.cmp_eq(inverse) & id.comes_first::<MANY>(groups, g);
         let wins = hit & (best.cmp_lt(inverse) | tie);
         groups.of[g].inv_lo = select(wins, inverse, best);
-        groups.of[g].slot = merge(wins, prim, groups.of[g].slot);
+        id.name::<MANY>(groups, g, wins);
         for (weight, x) in groups.of[g].weights.iter_mut().zip([found.u, found.v, one]) {
             *weight = select(wins, x, *weight);
         }
@@ -216,6 +269,10 @@ impl Groups {
         u.store(&mut hits.u[first..]);
         v.store(&mut hits.v[first..]);
         hits.prim[first..first + V::N].copy_from_slice(&self.of[g].slot);
+        if self.many {
+            hits.inst[first..first + V::N].copy_from_slice(&self.inst[g]);
+            return;
+        }
         let none = V::splat(f32::from_bits(INVALID_ID));
         let inst: [u32; 16] = bytemuck::cast(select(found, zero, none).to_array());
         hits.inst[first..first + V::N].copy_from_slice(&inst);
@@ -226,7 +283,10 @@ impl Groups {
         let (found, t, u, v) = self.own_numbers(g, rays, first);
         let mut hit = HitPacket::new(select(found, t, V::load(&rays.t_max[first..])));
         (hit.u, hit.v, hit.prim) = (u, v, self.of[g].slot);
-        hit.inst = self.of[g].slot.map(|prim| if prim == NO_SLOT { INVALID_ID } else { 0 });
+        hit.inst = match self.many {
+            true => self.inst[g],
+            false => self.of[g].slot.map(|prim| if prim == NO_SLOT { INVALID_ID } else { 0 }),
+        };
         hit
     }
 }

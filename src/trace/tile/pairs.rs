@@ -4,7 +4,7 @@ use super::batch::{BATCH, Planes};
 use super::bundle::Shared;
 use super::exact::{self, Exact, certain_pair};
 use super::groups::Groups;
-use super::own::{self, Verdict, own_depth, pair, pair_doubtful, pair_to_end};
+use super::own::{self, Id, Verdict, own_depth, pair, pair_doubtful, pair_to_end};
 use super::{GROUPS, Memory, SET, V};
 use crate::lanes::words::list_bits;
 use crate::lanes::{LaneMask, Lanes, each};
@@ -35,13 +35,34 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     exact: &Exact,
     counters: &mut Counters,
 ) {
-    let Memory { groups, batch, planes, pairs, slabs, .. } = memory;
+    let Memory { groups, batch, planes, pairs, .. } = memory;
     let seen = batch.set_up::<ANY, EXACT>(groups, planes);
     let (count, touched) = list::<N, EXACT>(seen, &batch.groups, groups, planes, pairs);
+    let found = match !EXACT && groups.many {
+        true => test::<ANY, EXACT, true, COUNT>(memory, exact, count, counters),
+        false => test::<ANY, EXACT, false, COUNT>(memory, exact, count, counters),
+    };
+    memory.batch.clear();
+    memory.slabs.learn(count, found);
+    if count != 0 {
+        memory.groups.refresh::<N>(touched);
+    }
+}
+
+/// Tests the first `count` pairs; returns how many gave something. `MANY`: triangles are of instances.
+#[inline(always)]
+fn test<const ANY: bool, const EXACT: bool, const MANY: bool, const COUNT: bool>(
+    memory: &mut Memory,
+    exact: &Exact,
+    count: usize,
+    counters: &mut Counters,
+) -> usize {
+    let Memory { groups, batch, planes, pairs, .. } = memory;
     let (mut found, mut again) = (0, 0);
     let to_end = matches!(exact.bundle.shared, Shared::End(_));
     for k in 0..count {
         let (g, i) = (usize::from(pairs.group[k]) & (GROUPS - 1), usize::from(pairs.triangle[k]) & 15);
+        let id = Id { inst: batch.inst[i], prim: batch.id[i] };
         if EXACT {
             let (certain, doubtful) = certain_pair::<ANY>(groups, planes, g, i, batch.id[i]);
             found += usize::from(certain | doubtful != 0);
@@ -50,15 +71,15 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
             }
         } else if (planes.wild | planes.unsteady) >> i & 1 != 0 {
             found += usize::from(if planes.wild >> i & 1 != 0 {
-                own::decide::<ANY>(groups, exact, g, batch.corners(i), batch.id[i])
+                own::decide::<ANY, MANY>(groups, exact, g, batch, i)
             } else {
-                pair_doubtful::<ANY>(groups, planes, g, i, batch.id[i], to_end)
+                pair_doubtful::<ANY, MANY>(groups, planes, g, i, id, to_end)
             });
         } else {
             let Verdict { hit, doubt } = if ANY && to_end {
                 pair_to_end(groups, planes, g, i)
             } else {
-                pair::<ANY>(groups, planes, g, i, batch.id[i])
+                pair::<ANY, MANY>(groups, planes, g, i, id)
             };
             found += usize::from(hit);
             // Always written, counted where it is wanted: a call in this loop would take the registers of all of it.
@@ -75,13 +96,10 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     }
     for &k in pairs.again.iter().take(again) {
         let (g, i) = (usize::from(pairs.group[usize::from(k)]), usize::from(pairs.triangle[usize::from(k)]) & 15);
-        pair_doubtful::<ANY>(groups, planes, g & (GROUPS - 1), i, batch.id[i], to_end);
+        let id = Id { inst: batch.inst[i], prim: batch.id[i] };
+        pair_doubtful::<ANY, MANY>(groups, planes, g & (GROUPS - 1), i, id, to_end);
     }
-    batch.clear();
-    slabs.learn(count, found);
-    if count != 0 {
-        groups.refresh::<N>(touched);
-    }
+    found
 }
 
 /// Lists the pairs whose rectangles and depths meet; returns how many, and the sets they are of.

@@ -7,27 +7,46 @@
 
 use super::bundle::{Bundle, Shared, load3};
 use super::groups::Groups;
-use super::node::MARGIN;
 use super::{GROUPS, HALF_ULP, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
-use crate::math::Aabb;
+use crate::math::{Aabb, Affine};
 
 /// The score stays within these.
 const SCORES: (i32, i32) = (-50, 400);
 
 /// Evidence, and what box tests need of the rays.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Slabs {
-    /// Depth per unit of each world axis, by group; valid where `ready` says so.
-    per_axis: [Lanes3<V>; GROUPS],
-    ready: u64,
+    /// In the world, and in the space of the instance that the tile is in.
+    slopes: [Slopes; 2],
     score: i32,
 }
 
-impl Default for Slabs {
+/// Rays of the groups in one space.
+#[derive(Clone, Debug)]
+struct Slopes {
+    /// Depth per unit of each axis, by group; valid where `ready` says so.
+    per_axis: [Lanes3<V>; GROUPS],
+    ready: u64,
+}
+
+impl Default for Slopes {
     fn default() -> Self {
-        Self { per_axis: [[V::splat(0.0); 3]; GROUPS], ready: 0, score: 0 }
+        Self { per_axis: [[V::splat(0.0); 3]; GROUPS], ready: 0 }
     }
+}
+
+/// The space of the boxes.
+#[derive(Clone, Copy, Debug)]
+pub struct Space<'a> {
+    /// The common point.
+    pub apex: [f32; 3],
+    /// How far outside of a box its contents may be met.
+    pub margin: f32,
+    /// Size of what is there, as seen from the apex.
+    pub extent: f32,
+    /// The way of world-space directions into it, if it is not the world's.
+    pub to_local: Option<&'a Affine<f32>>,
 }
 
 impl Slabs {
@@ -39,8 +58,14 @@ impl Slabs {
     /// A new tile: what was learnt counts half.
     #[inline(always)]
     pub fn start(&mut self) {
-        self.ready = 0;
+        self.slopes[0].ready = 0;
         self.score = (self.score / 2).max(0);
+    }
+
+    /// The tile goes into another instance.
+    #[inline(always)]
+    pub fn enter(&mut self) {
+        self.slopes[1].ready = 0;
     }
 
     /// Whether to test a box that `groups` meet.
@@ -62,19 +87,18 @@ impl Slabs {
 
     /// Of `groups`, those with a ray that meets the box.
     #[inline(never)]
-    pub fn test(&mut self, groups: &Groups, bundle: &Bundle, bounds: &Aabb<f32>, wanted: u64) -> u64 {
-        self.prepare(groups, bundle, wanted & !self.ready);
-        let frame = &groups.frame;
-        let margin = MARGIN * HALF_ULP * frame.extent + 2.0 * groups.slack / frame.scale;
-        let lo = each(|a| V::splat(bounds.lo[a] - frame.apex[a] - margin));
-        let hi = each(|a| V::splat(bounds.hi[a] - frame.apex[a] + margin));
+    pub fn test(&mut self, groups: &Groups, bundle: &Bundle, space: &Space, bounds: &Aabb<f32>, wanted: u64) -> u64 {
+        let slopes = &mut self.slopes[usize::from(space.to_local.is_some())];
+        slopes.prepare(groups, bundle, space, wanted & !slopes.ready);
+        let lo = each(|a| V::splat(bounds.lo[a] - space.apex[a] - space.margin));
+        let hi = each(|a| V::splat(bounds.hi[a] - space.apex[a] + space.margin));
         let more = V::splat(1.0 + 16.0 * HALF_ULP);
         let (mut met, mut rest) = (0, wanted);
         while rest != 0 {
             let g = rest.trailing_zeros() as usize & (GROUPS - 1);
             rest &= rest - 1;
             let [x, y, z] = each(|a| {
-                let (one, other) = (lo[a] * self.per_axis[g][a], hi[a] * self.per_axis[g][a]);
+                let (one, other) = (lo[a] * slopes.per_axis[g][a], hi[a] * slopes.per_axis[g][a]);
                 (one.fast_min(other), one.fast_max(other))
             });
             let near = x.0.fast_max(y.0).fast_max(z.0.fast_max(V::splat(0.0)));
@@ -86,13 +110,15 @@ impl Slabs {
         self.add(8 * culled - 2 * tested);
         met
     }
+}
 
+impl Slopes {
     /// Reciprocals of the directions, scaled so that the parameter is the depth.
     #[inline(always)]
-    fn prepare(&mut self, groups: &Groups, bundle: &Bundle, mut missing: u64) {
+    fn prepare(&mut self, groups: &Groups, bundle: &Bundle, space: &Space, mut missing: u64) {
         self.ready |= missing;
         // Far below the margin of the boxes, far above what overflows.
-        let least = V::splat(1e-10 / groups.frame.scale);
+        let least = V::splat(1e-10 * space.extent);
         while missing != 0 {
             let g = missing.trailing_zeros() as usize & (GROUPS - 1);
             missing &= missing - 1;
@@ -103,6 +129,10 @@ impl Slabs {
                     let org = load3(&bundle.rays.org, at);
                     each(|a| org[a] - V::splat(groups.frame.apex[a]))
                 }
+            };
+            let direction = match space.to_local {
+                Some(map) => map.vectors(direction),
+                None => direction,
             };
             let per_depth = V::constant(1.0) / groups.of[g].speed;
             self.per_axis[g] = map3(direction, |d| {

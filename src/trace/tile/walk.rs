@@ -1,19 +1,49 @@
-//! A tile's way through the tree: nearest child first, without sorting and without a stack of children. A level
+//! A tile's way through a tree: nearest child first, without sorting and without a stack of children. A level
 //! keeps the keys of the children not yet visited; it is left when the nearest of them lies behind everything.
 
+use super::batch::BATCH;
 use super::exact::Exact;
-use super::node::{Level, Planes, key};
+use super::node::{self, Level, Planes, key};
 use super::pairs::flush;
-use super::{Memory, SET, V};
-use crate::bvh::{Child, Node, WIDTH};
+use super::place::{self, Place};
+use super::shapes;
+use super::slab::Space;
+use super::{HALF_ULP, Memory, SET, V};
+use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::Lanes;
 use crate::lanes::words::{least_key, prefetch};
 use crate::ray::Counters;
-use crate::scene::world::Object;
+use crate::scene::world::{Class, Object, World};
 
-use super::batch::BATCH;
+/// A tree as a tile sees it.
+struct View<'a> {
+    tree: &'a Tree<f32>,
+    planes: Planes,
+    space: Space<'a>,
+    /// Level of the root: those before it belong to the tree that holds this one.
+    first: usize,
+}
 
-/// Traces the `N` sets that are loaded in `memory` through the object.
+/// What the leaves of a tree hold.
+trait Leaves<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> {
+    /// Asks the memory for what a leaf refers to.
+    fn fetch(&self, leaf: Child);
+    /// Whether a leaf is dear enough for a test of its box against single rays.
+    fn is_dear(&self, leaf: Child) -> bool;
+    /// Visits a leaf with some groups.
+    fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters);
+}
+
+/// Blocks of triangles, of an instance or in the world.
+struct Blocks<'a> {
+    object: &'a Object<f32>,
+    place: Option<&'a Place<'a>>,
+}
+
+/// Instances.
+struct Instances<'a>(&'a World<f32>);
+
+/// Traces the `N` sets that are loaded in `memory` through the world.
 #[inline(always)]
 pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     memory: &mut Memory,
@@ -21,21 +51,50 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
     groups: u64,
     counters: &mut Counters,
 ) {
-    let tree = &exact.object.tree;
-    let Some(root) = tree.nodes.first() else { return };
     memory.batch.clear();
     memory.slabs.start();
-    let planes = Planes::of(&memory.groups);
+    let frame = &memory.groups.frame;
+    let slack = memory.groups.slack / frame.scale;
+    let space = |margin| Space { apex: frame.apex, margin: margin + 2.0 * slack, extent: frame.extent, to_local: None };
+    if !EXACT && memory.groups.many {
+        let margin = place::margin(exact.world, frame);
+        let planes = Planes::of(&memory.groups, frame, margin);
+        let view = View { tree: &exact.world.top, planes, space: space(margin), first: 0 };
+        descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &Instances(exact.world), groups, counters);
+    } else {
+        let margin = node::MARGIN * HALF_ULP * frame.extent;
+        let planes = Planes::of(&memory.groups, frame, margin);
+        let view = View { tree: &exact.object.tree, planes, space: space(margin), first: 0 };
+        let leaves = Blocks { object: exact.object, place: None };
+        descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &leaves, groups, counters);
+    }
+    if memory.batch.len() > 0 {
+        flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
+    }
+}
+
+/// Takes some groups through a tree.
+#[inline(never)]
+fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
+    memory: &mut Memory,
+    exact: &Exact,
+    view: &View,
+    leaves: &impl Leaves<N, ANY, EXACT, COUNT>,
+    groups: u64,
+    counters: &mut Counters,
+) {
+    let tree = view.tree;
+    let Some(root) = tree.nodes.first() else { return };
     let mut limit = limit(memory);
-    let mut depth = 0;
-    if !open::<N, COUNT>(exact.object, &planes, root, 0, groups, &mut memory.levels[0], counters) {
+    let mut depth = view.first;
+    if !open(view, leaves, root, 0, groups, &mut memory.levels[depth], counters) {
         return;
     }
     loop {
         let level = &mut memory.levels[depth];
         let (nearest, slot) = least_key(&level.keys);
         if u32::from(nearest) >= limit {
-            if depth == 0 {
+            if depth == view.first {
                 break;
             }
             depth -= 1;
@@ -44,26 +103,23 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
         level.remove(slot);
         let mut met = level.groups_at::<N>(slot, &memory.groups);
         let node = &tree.nodes[level.node as usize];
-        if met != 0 && memory.slabs.wanted::<ANY>(met) {
-            met = memory.slabs.test(&memory.groups, exact.bundle, &node.child_bounds(slot), met);
+        let child = node.child(slot);
+        if met != 0 && (memory.slabs.wanted::<ANY>(met) || leaves.is_dear(child)) {
+            met = memory.slabs.test(&memory.groups, exact.bundle, &view.space, &node.child_bounds(slot), met);
         }
         if met == 0 {
             continue;
         }
-        let child = node.child(slot);
         if child.is_leaf() {
-            leaf::<N, ANY, EXACT, COUNT>(memory, exact, child, met, counters);
+            leaves.visit(memory, exact, child, met, counters);
             limit = self::limit(memory);
         } else {
             let node = &tree.nodes[child.index as usize];
             let below = &mut memory.levels[depth + 1];
-            if open::<N, COUNT>(exact.object, &planes, node, child.index, met, below, counters) {
+            if open(view, leaves, node, child.index, met, below, counters) {
                 depth += 1;
             }
         }
-    }
-    if memory.batch.len() > 0 {
-        flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
     }
 }
 
@@ -75,9 +131,9 @@ fn limit(memory: &Memory) -> u32 {
 }
 
 #[inline(always)]
-fn open<const N: usize, const COUNT: bool>(
-    object: &Object<f32>,
-    planes: &Planes,
+fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
+    view: &View,
+    leaves: &impl Leaves<N, ANY, EXACT, COUNT>,
     node: &Node<f32>,
     index: u32,
     groups: u64,
@@ -91,7 +147,7 @@ fn open<const N: usize, const COUNT: bool>(
         counters.node_lanes_active += u64::from(groups.count_ones()) * V::N as u64;
         counters.node_lanes_total += (N * SET * V::N) as u64;
     }
-    let mut met = planes.open(node, level);
+    let mut met = view.planes.open(node, level);
     if met == 0 {
         return false;
     }
@@ -101,28 +157,74 @@ fn open<const N: usize, const COUNT: bool>(
         let child = node.child(met.trailing_zeros() as usize & 7);
         met &= met - 1;
         if child.is_leaf() {
-            prefetch(&object.triangles, child.index as usize);
+            leaves.fetch(child);
         } else {
-            prefetch(&object.tree.nodes, child.index as usize);
+            prefetch(&view.tree.nodes, child.index as usize);
         }
     }
     true
 }
 
-#[inline(always)]
-fn leaf<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
-    memory: &mut Memory,
-    exact: &Exact,
-    child: Child,
-    groups: u64,
-    counters: &mut Counters,
-) {
-    let count = usize::from(child.count);
-    if COUNT {
-        counters.leaves += 1;
+impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leaves<N, ANY, EXACT, COUNT>
+    for Blocks<'_>
+{
+    #[inline(always)]
+    fn fetch(&self, leaf: Child) {
+        prefetch(&self.object.triangles, leaf.index as usize);
     }
-    if memory.batch.len() + count > BATCH {
-        flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
+
+    #[inline(always)]
+    fn is_dear(&self, leaf: Child) -> bool {
+        !EXACT && leaf.class != Class::Triangle as u8
     }
-    memory.batch.push::<EXACT>(&exact.object.triangles[child.index as usize], child.index * 8, count, groups);
+
+    #[inline(always)]
+    fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters) {
+        if let Some(place) = self.place
+            && self.is_dear(leaf)
+        {
+            let Memory { groups: state, stack, .. } = memory;
+            let shapes = (self.object, place.inst);
+            shapes::visit::<N, ANY, COUNT>(state, exact, shapes, leaf, groups, stack, counters);
+            return;
+        }
+        let count = usize::from(leaf.count);
+        if COUNT {
+            counters.leaves += 1;
+        }
+        if memory.batch.len() + count > BATCH {
+            flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
+        }
+        let block = &self.object.triangles[leaf.index as usize];
+        match self.place {
+            Some(place) if !EXACT => memory.batch.push_placed::<ANY>(block, leaf.index * 8, count, groups, place),
+            _ => memory.batch.push::<EXACT>(block, leaf.index * 8, count, groups),
+        }
+    }
+}
+
+impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leaves<N, ANY, EXACT, COUNT>
+    for Instances<'_>
+{
+    #[inline(always)]
+    fn fetch(&self, leaf: Child) {
+        prefetch(&self.0.assembly.placements, self.0.top_leaves[leaf.index as usize] as usize);
+    }
+
+    #[inline(always)]
+    fn is_dear(&self, _leaf: Child) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters) {
+        let (world, state) = (self.0, &memory.groups);
+        let place = Place::new(world, world.top_leaves[leaf.index as usize], &state.frame);
+        let planes = Planes::of(state, &place.frame, node::MARGIN * HALF_ULP * place.frame.extent);
+        let space = place.space(world, state.slack / state.frame.scale);
+        let view = View { tree: &place.object.tree, planes, space, first: world.top.depth as usize };
+        let leaves = Blocks { object: place.object, place: Some(&place) };
+        memory.slabs.enter();
+        descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &leaves, groups, counters);
+    }
 }

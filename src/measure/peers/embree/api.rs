@@ -23,6 +23,8 @@ pub type PacketQuery =
 pub const PROPERTY_VERSION: u32 = 0;
 /// `RTC_GEOMETRY_TYPE_TRIANGLE`.
 pub const GEOMETRY_TRIANGLE: u32 = 0;
+/// `RTC_GEOMETRY_TYPE_INSTANCE`.
+pub const GEOMETRY_INSTANCE: u32 = 121;
 /// `RTC_BUFFER_TYPE_INDEX`.
 pub const BUFFER_INDEX: u32 = 0;
 /// `RTC_BUFFER_TYPE_VERTEX`.
@@ -31,6 +33,8 @@ pub const BUFFER_VERTEX: u32 = 1;
 pub const FORMAT_UINT3: u32 = 0x5003;
 /// `RTC_FORMAT_FLOAT3`.
 pub const FORMAT_FLOAT3: u32 = 0x9003;
+/// `RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR`: three columns and the translation.
+pub const FORMAT_FLOAT3X4: u32 = 0x9234;
 /// `RTC_BUILD_QUALITY_HIGH`.
 pub const QUALITY_HIGH: u32 = 2;
 /// `RTC_SCENE_FLAG_NONE`.
@@ -103,7 +107,9 @@ api! {
     new_scene = "rtcNewScene": unsafe extern "C" fn(Handle) -> Handle,
     set_scene_flags = "rtcSetSceneFlags": unsafe extern "C" fn(Handle, u32),
     set_build_quality = "rtcSetSceneBuildQuality": unsafe extern "C" fn(Handle, u32),
-    attach = "rtcAttachGeometry": unsafe extern "C" fn(Handle, Handle) -> u32,
+    attach = "rtcAttachGeometryByID": unsafe extern "C" fn(Handle, Handle, u32),
+    set_instanced = "rtcSetGeometryInstancedScene": unsafe extern "C" fn(Handle, Handle),
+    set_transform = "rtcSetGeometryTransform": unsafe extern "C" fn(Handle, u32, u32, *const c_void),
     commit_scene = "rtcCommitScene": unsafe extern "C" fn(Handle),
     release_scene = "rtcReleaseScene": unsafe extern "C" fn(Handle),
     intersect1 = "rtcIntersect1": SingleQuery,

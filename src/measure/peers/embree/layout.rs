@@ -30,6 +30,8 @@ pub const PRIM: usize = 17;
 pub const GEOM: usize = 18;
 /// Rows of a ray with a hit, without instance numbers.
 pub const HIT_ROWS: usize = 19;
+/// Row of the (outermost) instance number, all ones outside of instances.
+pub const INST: usize = HIT_ROWS;
 
 /// Memory aligned as the largest packet wants it.
 #[repr(C, align(64))]
@@ -71,7 +73,7 @@ pub fn row<const N: usize>(packet: &[u32], row: usize) -> &[u32; N] {
 /// Fills the ray rows (and, if there are any, the hit rows with a miss) of `packet` with the rays `first..first + N`;
 /// sets `valid` to -1 for live rays, else to 0. Returns whether any is live.
 pub fn fill<const N: usize>(packet: &mut [u32], valid: &mut [u32], rays: &Rays<f32>, first: usize) -> bool {
-    let with_hit = packet.len() >= HIT_ROWS * N;
+    let with_hit = packet.len() > HIT_ROWS * N;
     for lane in 0..N {
         let i = first + lane;
         let live = i < rays.len() && rays.is_live(i);
@@ -93,6 +95,7 @@ pub fn fill<const N: usize>(packet: &mut [u32], valid: &mut [u32], rays: &Rays<f
         if with_hit {
             set(PRIM, INVALID_ID);
             set(GEOM, INVALID_ID);
+            set(INST, INVALID_ID);
         }
     }
     valid[..N].iter().any(|&lane| lane != 0)
@@ -132,7 +135,7 @@ mod tests {
         let lane: Vec<u32> = (0..20).map(|row| packets.get(0)[4 * row + 1]).collect();
         let reals: Vec<f32> = lane.iter().map(|&bits| f32::from_bits(bits)).collect();
         assert_eq!(reals[..9], [1.0, 2.0, 3.0, 0.5, 4.0, 5.0, 6.0, 0.0, 9.0]);
-        assert_eq!(lane[9..], [u32::MAX, 0, 0, 0, 0, 0, 0, 0, INVALID_ID, INVALID_ID, 0]);
+        assert_eq!(lane[9..], [u32::MAX, 0, 0, 0, 0, 0, 0, 0, INVALID_ID, INVALID_ID, INVALID_ID]);
         let dead = packets.get(0);
         assert!(f32::from_bits(dead[4 * T_FAR]) < f32::from_bits(dead[4 * T_NEAR]));
         assert!(!fill::<4>(packets.get_mut(0), valid.get_mut(0), &rays, 0));

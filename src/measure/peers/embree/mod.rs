@@ -1,8 +1,8 @@
 //! Embree 4, loaded at run time, in every mode: packets of 1, 4, 8 and 16, with and without the coherent flag.
 //!
 //! Build quality HIGH, scene flags none (`embree`) or ROBUST (`embree-robust`), one triangle geometry over a shared
-//! vertex buffer of 16-byte stride. Rays are packed before the clock starts; t, u, v and primitive are copied out
-//! after each call, under the clock.
+//! vertex buffer of 16-byte stride; objects that are placed several times are scenes of their own under instances. Rays
+//! are packed before the clock starts; t, u, v, primitive and instance are copied out after each call, under the clock.
 //!
 //! Source: I. Wald, S. Woop, C. Benthin, G. Johnson, M. Ernst, "Embree: A Kernel Framework for Efficient CPU Ray
 //! Tracing", TOG 33(4), 2014, and the manual of Embree 4.
@@ -16,12 +16,12 @@ mod session;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::triangles::WorldTriangles;
-use super::{Facts, Packed, Peer};
+use super::triangles::PlacedTriangles;
+use super::{Facts, Packed, Peer, rename};
 use crate::measure::raysets::Query;
 use crate::ray::{Hits, INVALID_ID, Rays};
 use api::Arguments;
-use layout::{PRIM, Packets, RAY_ROWS, T_FAR, U, V, row};
+use layout::{INST, PRIM, Packets, RAY_ROWS, T_FAR, U, V, row};
 use session::Session;
 
 /// Environment variable that names the library.
@@ -63,7 +63,7 @@ pub fn candidates(path: Option<&Path>) -> Vec<PathBuf> {
 /// Why there is no usable Embree.
 pub fn open(
     path: Option<&Path>,
-    triangles: Arc<WorldTriangles>,
+    triangles: Arc<PlacedTriangles>,
     threads: usize,
     robust: bool,
 ) -> Result<Vec<Box<dyn Peer<f32>>>, String> {
@@ -79,11 +79,15 @@ pub fn open(
     Err(format!("no Embree 4 (give --embree PATH or set {VARIABLE}): {telling}"))
 }
 
-fn modes(session: Session, triangles: &Arc<WorldTriangles>, robust: bool) -> Vec<Box<dyn Peer<f32>>> {
+fn modes(session: Session, triangles: &Arc<PlacedTriangles>, robust: bool) -> Vec<Box<dyn Peer<f32>>> {
     let [major, minor, patch] = session.version;
     let flags = if robust { "ROBUST" } else { "none" };
-    let instances = if session.hit_rows > layout::HIT_ROWS + 1 { ", instPrimID in hits" } else { "" };
-    let description = format!("Embree {major}.{minor}.{patch}, quality HIGH, scene flags {flags}{instances}");
+    let more = if session.hit_rows > layout::HIT_ROWS + 1 { ", instPrimID in hits" } else { "" };
+    let mut description = format!("Embree {major}.{minor}.{patch}, quality HIGH, scene flags {flags}{more}");
+    if !triangles.instances.is_empty() {
+        let (instances, objects) = (triangles.instances.len(), triangles.objects.len());
+        description += &format!(", {instances} instances of {objects} objects");
+    }
     let session = Arc::new(session);
     let one = |(width, coherent, mode)| {
         let facts = Facts {
@@ -101,7 +105,7 @@ fn modes(session: Session, triangles: &Arc<WorldTriangles>, robust: bool) -> Vec
 
 struct Mode {
     session: Arc<Session>,
-    triangles: Arc<WorldTriangles>,
+    triangles: Arc<PlacedTriangles>,
     facts: Facts,
     width: usize,
     coherent: bool,
@@ -121,8 +125,15 @@ impl Peer<f32> for Mode {
         }
     }
 
-    fn ids(&self) -> &[[u32; 2]] {
-        &self.triangles.ids
+    fn rename(&self, hits: &mut Hits<f32>) {
+        let PlacedTriangles { world, objects, instances } = &*self.triangles;
+        rename(hits, |prim, inst| match instances.get(inst as usize) {
+            None => world.ids.get(prim as usize).copied(),
+            Some(placed) => {
+                let [prim, _] = *objects[placed.object as usize].ids.get(prim as usize)?;
+                Some([prim, placed.inst])
+            }
+        });
     }
 }
 
@@ -173,7 +184,7 @@ impl<const N: usize> Packed<f32> for Batch<'_, N> {
         hits.reset(self.len);
         self.trace::<false>(|packet, at| {
             let (t, u, v) = (row::<N>(packet, T_FAR), row::<N>(packet, U), row::<N>(packet, V));
-            let prim = row::<N>(packet, PRIM);
+            let (prim, inst) = (row::<N>(packet, PRIM), row::<N>(packet, INST));
             let each = at..at + N;
             // Hits are padded to a multiple of every N.
             let (to_t, to_u, to_v) = (&mut hits.t[each.clone()], &mut hits.u[each.clone()], &mut hits.v[each.clone()]);
@@ -184,7 +195,7 @@ impl<const N: usize> Packed<f32> for Batch<'_, N> {
                 to_u[i] = f32::from_bits(u[i]);
                 to_v[i] = f32::from_bits(v[i]);
                 to_prim[i] = prim[i];
-                to_inst[i] = if hit { 0 } else { INVALID_ID };
+                to_inst[i] = inst[i];
             }
         });
     }

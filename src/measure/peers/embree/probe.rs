@@ -8,6 +8,7 @@
 use super::api::{Arguments, Handle};
 use super::layout::{self, DIR, GEOM, HIT_ROWS, MASK, ORG, PRIM, Packets, T_FAR, U, V, row};
 use super::session::Session;
+use crate::measure::peers::triangles::Triangles;
 
 /// Rows behind the known ones that are watched.
 const WATCHED: usize = 64;
@@ -21,9 +22,12 @@ const PATTERN: u32 = 0xa5c3_96e1;
 /// # Errors
 /// If the library does not answer as the headers say, at any packet width.
 pub fn hit_rows(session: &Session) -> Result<usize, String> {
-    let vertices = [[0.0, 0.0, 0.0, 0.0], [4.0, 0.0, 0.0, 0.0], [0.0, 4.0, 0.0, 0.0]];
-    let indices = [[0, 1, 2]];
-    let scene = session.build(&vertices, &indices, false)?;
+    let triangle = Triangles {
+        vertices: vec![[0.0, 0.0, 0.0, 0.0], [4.0, 0.0, 0.0, 0.0], [0.0, 4.0, 0.0, 0.0]],
+        indices: vec![[0, 1, 2]],
+        ids: vec![[0, 0]],
+    };
+    let scene = session.build(&triangle, &[], false)?;
     let rows = [shoot::<1>, shoot::<4>, shoot::<8>, shoot::<16>].map(|shoot| shoot(session, scene));
     session.release(scene);
     let mut most = HIT_ROWS + 1;

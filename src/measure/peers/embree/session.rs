@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use super::api::{self, Api, Arguments, Handle};
 use super::probe;
-use crate::measure::peers::triangles::WorldTriangles;
+use crate::measure::peers::triangles::{PlacedObject, PlacedTriangles, Triangles};
 
 /// What the library tells us from within its calls.
 #[derive(Default)]
@@ -22,9 +22,11 @@ pub struct Session {
     api: Arc<Api>,
     device: Handle,
     scene: Handle,
+    /// Scenes of objects that are placed several times.
+    objects: Vec<Handle>,
     reports: Box<Reports>,
     // Embree reads the vertices where they are for as long as the scene lives.
-    _triangles: Arc<WorldTriangles>,
+    _triangles: Arc<PlacedTriangles>,
     /// Seconds of committing geometry and scene.
     pub build_seconds: f64,
     /// Rows of a packet with hits in this build of the library.
@@ -44,7 +46,7 @@ impl Session {
     ///
     /// # Errors
     /// Why this library cannot be used.
-    pub fn open(path: &Path, triangles: Arc<WorldTriangles>, threads: usize, robust: bool) -> Result<Self, String> {
+    pub fn open(path: &Path, triangles: Arc<PlacedTriangles>, threads: usize, robust: bool) -> Result<Self, String> {
         let api = Arc::new(Api::load(path)?);
         let config =
             CString::new(format!("threads={threads},start_threads=1,hugepages=1")).map_err(|e| e.to_string())?;
@@ -60,6 +62,7 @@ impl Session {
             api,
             device,
             scene: std::ptr::null_mut(),
+            objects: Vec::new(),
             reports: Box::default(),
             _triangles: triangles.clone(),
             build_seconds: 0.0,
@@ -75,7 +78,11 @@ impl Session {
         session.hit_rows = probe::hit_rows(&session)?;
         session.reports.bytes.store(0, Ordering::Relaxed);
         let start = Instant::now();
-        session.scene = session.build(&triangles.vertices, &triangles.indices, robust)?;
+        for object in &triangles.objects {
+            let scene = session.build(object, &[], robust)?;
+            session.objects.push(scene);
+        }
+        session.scene = session.build(&triangles.world, &triangles.instances, robust)?;
         session.build_seconds = start.elapsed().as_secs_f64();
         Ok(session)
     }
@@ -111,34 +118,63 @@ impl Session {
         }
     }
 
-    /// A committed scene of one triangle geometry over buffers that outlive it.
+    /// A committed scene of one triangle geometry over buffers that outlive it (none if there are no triangles) and of
+    /// instances of the objects built so far. Geometry `i` is instance `i`; the triangles come after them.
     ///
     /// # Errors
     /// What the library reports.
-    pub(super) fn build(&self, vertices: &[[f32; 4]], indices: &[[u32; 3]], robust: bool) -> Result<Handle, String> {
+    pub(super) fn build(
+        &self,
+        triangles: &Triangles,
+        instances: &[PlacedObject],
+        robust: bool,
+    ) -> Result<Handle, String> {
         let flags = if robust { api::SCENE_ROBUST } else { api::SCENE_NONE };
+        let api = &self.api;
+        // SAFETY: the device is live.
+        let scene = unsafe { (api.new_scene)(self.device) };
+        for (id, placed) in instances.iter().enumerate() {
+            // SAFETY: the device, the new scene and the object's committed scene are live; the map has twelve floats,
+            // which are copied. The scene holds a reference to the geometry and that one to the object's scene.
+            unsafe {
+                let geometry = (api.new_geometry)(self.device, api::GEOMETRY_INSTANCE);
+                (api.set_instanced)(geometry, self.objects[placed.object as usize]);
+                (api.set_transform)(geometry, 0, api::FORMAT_FLOAT3X4, placed.to_world.as_ptr().cast());
+                (api.commit_geometry)(geometry);
+                (api.attach)(scene, geometry, id as u32);
+                (api.release_geometry)(geometry);
+            }
+        }
+        if !triangles.indices.is_empty() {
+            self.attach(scene, triangles, instances.len() as u32);
+        }
+        // SAFETY: the scene is live, and nobody else knows it yet.
+        unsafe {
+            (api.set_scene_flags)(scene, flags);
+            (api.set_build_quality)(scene, api::QUALITY_HIGH);
+            (api.commit_scene)(scene);
+        }
+        self.check().inspect_err(|_| self.release(scene))?;
+        Ok(scene)
+    }
+
+    /// Adds triangles to a scene; their buffers outlive it.
+    fn attach(&self, scene: Handle, Triangles { vertices, indices, .. }: &Triangles, id: u32) {
         let (api, from) = (&self.api, |data: *const c_void| data);
-        // SAFETY: the device is live, handles are used before they are released, the strides are those of the slices,
-        // indices are in range of the vertices, and each vertex can be read as 16 bytes. The caller keeps both slices
-        // until the scene is released. The scene holds a reference to the geometry, so ours can go.
-        let scene = unsafe {
+        let (float3, uint3) = (api::FORMAT_FLOAT3, api::FORMAT_UINT3);
+        // SAFETY: the device and the scene are live, the geometry is used before it is released, the strides are those of
+        // the slices, indices are in range of the vertices, and each vertex can be read as 16 bytes. The caller keeps both
+        // slices until the scene is released. The scene holds a reference to the geometry, so ours can go.
+        unsafe {
             let geometry = (api.new_geometry)(self.device, api::GEOMETRY_TRIANGLE);
-            let (float3, uint3) = (api::FORMAT_FLOAT3, api::FORMAT_UINT3);
             let vertex_data = from(vertices.as_ptr().cast());
             (api.set_buffer)(geometry, api::BUFFER_VERTEX, 0, float3, vertex_data, 0, 16, vertices.len());
             let index_data = from(indices.as_ptr().cast());
             (api.set_buffer)(geometry, api::BUFFER_INDEX, 0, uint3, index_data, 0, 12, indices.len());
             (api.commit_geometry)(geometry);
-            let scene = (api.new_scene)(self.device);
-            (api.set_scene_flags)(scene, flags);
-            (api.set_build_quality)(scene, api::QUALITY_HIGH);
-            (api.attach)(scene, geometry);
+            (api.attach)(scene, geometry, id);
             (api.release_geometry)(geometry);
-            (api.commit_scene)(scene);
-            scene
-        };
-        self.check().inspect_err(|_| self.release(scene))?;
-        Ok(scene)
+        }
     }
 
     /// Releases a scene of [`Session::build`].
@@ -193,7 +229,8 @@ impl Session {
 impl Drop for Session {
     fn drop(&mut self) {
         self.release(self.scene);
-        // SAFETY: the device came from this library; its scene is gone, and nobody uses it after this.
+        self.objects.iter().for_each(|&object| self.release(object));
+        // SAFETY: the device came from this library; its scenes are gone, and nobody uses it after this.
         unsafe { (self.api.release_device)(self.device) };
     }
 }
