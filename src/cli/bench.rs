@@ -56,7 +56,8 @@ pub struct BenchArgs {
     scenes: Vec<String>,
     #[command(flatten)]
     options: SceneOptions,
-    /// Ray classes
+    /// Ray classes: primary, camera (the same, made under the clock), shadow, ao, reflect, diffuse, diffuse2, diffuse3,
+    /// scatter
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "primary,shadow,ao,reflect,diffuse")]
     rays: Vec<RayKind>,
     /// Engines by name [default: all]

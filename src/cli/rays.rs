@@ -35,7 +35,7 @@ The order is that of 32x32 pixel tiles, Morton order inside. Where a primary ray
 pub struct RaysArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Ray class: primary, shadow, ao, reflect, diffuse, diffuse2, diffuse3 or scatter
+    /// Ray class: primary (or camera, which is the same here), shadow, ao, reflect, diffuse, diffuse2, diffuse3 or scatter
     #[arg(long)]
     kind: RayKind,
     #[command(flatten)]

@@ -135,7 +135,7 @@ impl Workers {
             })
         });
         if let Tracer::Peer(peer) = tracer {
-            out.iter_mut().for_each(|hits| rename(peer.ids(), hits));
+            out.iter_mut().for_each(|hits| peer.rename(hits));
         }
         seconds
     }

@@ -3,7 +3,8 @@
 //! A batch is what an engine gets in one call: usually the rays of one 32x32 or 16x16 pixel tile in Morton order.
 //! The arrays are padded with dead rays to a multiple of [`PAD`], so every packet width loads whole vectors.
 
-use crate::lanes::{LaneMask, Lanes, Real};
+use crate::lanes::chosen::Chosen;
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
 
 /// "No primitive", "no instance".
 pub const INVALID_ID: u32 = u32::MAX;
@@ -79,6 +80,17 @@ impl<S: Real> Rays<S> {
         }
         self.t_min[i] = t_min;
         self.t_max[i] = t_max;
+    }
+
+    /// Sets rays from `first` on to those of the lanes `chosen` of origins, directions and ends; they start at 0.
+    #[inline(always)]
+    pub fn put(&mut self, first: usize, chosen: &Chosen, [org, dir]: [Lanes3<S::Wide>; 2], t_max: S::Wide) {
+        for axis in 0..3 {
+            chosen.pack(org[axis], &mut self.org[axis][first..]);
+            chosen.pack(dir[axis], &mut self.dir[axis][first..]);
+        }
+        self.t_min[first..first + chosen.len()].fill(S::ZERO);
+        chosen.pack(t_max, &mut self.t_max[first..]);
     }
 
     /// Makes ray `i` dead.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::vertices::lanes_of;
+use crate::lanes::chosen::Chosen;
 use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real, each};
 use crate::ray::Rays;
 
@@ -37,20 +37,12 @@ impl<S: Real> Branches<S> {
     /// Adds those of the lanes `lanes`, which belong to the samples `path`: rays from `org` along `dir` up to `t_max`.
     #[inline(always)]
     pub fn push(&mut self, lanes: u32, path: &[u32], [org, dir, weight]: [Lanes3<S::Wide>; 3], t_max: S) {
-        let (mut list, mut count) = ([0; MAX_LANES], 0);
-        for lane in lanes_of(lanes) {
-            list[count] = lane;
-            count += 1;
-            self.path.push(path[lane]);
-        }
-        let (list, first) = (&list[..count], self.path.len() - count);
+        let (chosen, first) = (Chosen::of(lanes), self.path.len());
+        self.path.extend(chosen.iter().map(|lane| path[lane]));
+        self.rays.put(first, &chosen, [org, dir], S::Wide::splat(t_max));
         for axis in 0..3 {
-            pack(org[axis], list, &mut self.rays.org[axis][first..]);
-            pack(dir[axis], list, &mut self.rays.dir[axis][first..]);
-            pack(weight[axis], list, &mut self.weight[axis][first..]);
+            chosen.pack(weight[axis], &mut self.weight[axis][first..]);
         }
-        self.rays.t_min[first..first + count].fill(S::ZERO);
-        self.rays.t_max[first..first + count].fill(t_max);
     }
 
     /// Ends the additions.
@@ -74,15 +66,4 @@ impl<S: Real> Branches<S> {
     pub fn weight_of(&self, i: usize) -> DVec3 {
         DVec3::from(each(|axis| self.weight[axis][i].to_f64()))
     }
-}
-
-/// The lanes `list` of `from`, one after the other.
-#[inline(always)]
-fn pack<V: Lanes>(from: V, list: &[usize], to: &mut [V::Scalar]) {
-    if list.len() == V::N {
-        return from.store(to);
-    }
-    let mut column = [V::Scalar::ZERO; MAX_LANES];
-    from.store(&mut column);
-    to.iter_mut().zip(list).for_each(|(x, &lane)| *x = column[lane % MAX_LANES]);
 }

@@ -8,6 +8,7 @@ use super::look::{Look, Model};
 use super::offset::position_error;
 use super::place::Place;
 use super::shader::Shader;
+use crate::lanes::chosen::lanes_of;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3};
 use crate::ray::{Hits, INVALID_ID, Rays};
 use crate::scene::world::Surface;
@@ -113,18 +114,6 @@ impl<S: Real> Vertices<S> {
     fn put(&mut self, field: usize, i: usize, value: DVec3) {
         (0..3).for_each(|axis| self.fields[field + axis][i] = S::from_f64(value[axis]));
     }
-}
-
-/// The set bits of `bits`.
-#[inline(always)]
-pub(super) fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = bits.trailing_zeros() as usize;
-        (bits != 0).then(|| {
-            bits &= bits - 1;
-            lane
-        })
-    })
 }
 
 /// Where a vector of rays met surfaces, and whose.

@@ -9,9 +9,8 @@ use super::classic::refracted;
 use super::lights::Lamp;
 use super::sample::Sample;
 use super::shader::{Shader, Workspace};
-use super::vertices::{
-    AMBIENT, DIFFUSE, EMISSION, ETA, MIRROR, NORMAL, POSITION, SHADING, THROUGH, Vertices, lanes_of,
-};
+use super::vertices::{AMBIENT, DIFFUSE, EMISSION, ETA, MIRROR, NORMAL, POSITION, SHADING, THROUGH, Vertices};
+use crate::lanes::chosen::lanes_of;
 use crate::lanes::space::{add, choose, scale, times};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each};
 use crate::ray::Rays;

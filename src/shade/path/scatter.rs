@@ -7,6 +7,7 @@ use super::bsdf::Bsdf;
 use super::points::{NORMAL, OFFSET, OUT, POSITION, Points, SHADING, SQUEEZE, THROUGHPUT};
 use super::wave::{Shadows, Wave};
 use crate::camera::sobol::{PixelPoints, fraction};
+use crate::lanes::chosen::Chosen;
 use crate::lanes::space::{Frame, choose, scale, sub};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot};
 
@@ -176,10 +177,7 @@ impl<S: Real> Paths<'_, S> {
         let dir = [0, 1, 2].map(|i| target.place[i] - org[i] * target.near);
         let far = target.near.cmp_lt(one);
         let t_max = S::Wide::select(far, S::Wide::splat(S::INFINITY), S::Wide::splat(self.shadow_end));
-        let (org, dir, light, [t_max, ..]) = (spill(org), spill(dir), spill(light), spill([t_max; 3]));
-        for lane in lanes_of(wanted.bits(), path.len()) {
-            shadows.push(path[lane], at(&org, lane), at(&dir, lane), t_max[lane], at(&light, lane));
-        }
+        shadows.push(&those(wanted, path), path, [org, dir, light], t_max);
     }
 
     /// Something that shines for each point of the packet, by chance.
@@ -286,17 +284,10 @@ fn on_triangles<V: Lanes>(
     }
 }
 
-/// The set bits of `bits` below `count`.
+/// Those of the lanes `mask` that belong to a path.
 #[inline(always)]
-fn lanes_of(bits: u32, count: usize) -> impl Iterator<Item = usize> {
-    let mut bits = bits & ((1u32 << count) - 1);
-    std::iter::from_fn(move || {
-        let lane = bits.trailing_zeros() as usize;
-        (bits != 0).then(|| {
-            bits &= bits - 1;
-            lane
-        })
-    })
+fn those(mask: impl LaneMask, path: &[u32]) -> Chosen {
+    Chosen::of(mask.bits() & ((1 << path.len()) - 1))
 }
 
 /// The next ray of each path of the packet that goes on.
@@ -323,9 +314,5 @@ fn go_on<S: Real, B: Bsdf<S::Wide>>(
         alive = alive & S::Wide::load(&numbers.roulette).cmp_lt(chance);
         throughput = choose(alive, throughput.map(|t| t / chance), throughput);
     }
-    let (org, dir, throughput) = (spill(org), spill(dir), spill(throughput));
-    let [pdf, squeeze, _] = spill([sampled.pdf, squeeze, one]);
-    for lane in lanes_of(alive.bits(), path.len()) {
-        next.push(path[lane], at(&org, lane), at(&dir, lane), at(&throughput, lane), pdf[lane], squeeze[lane]);
-    }
+    next.push_some(&those(alive, path), path, [org, dir, throughput], [sampled.pdf, squeeze]);
 }

@@ -1,7 +1,8 @@
 //! The rays of one bounce of many paths, with what they carry, and the shadow rays that go with them.
 
 use super::points::{BASE, FIELDS, Fields, PARAM, RAW_DIR, RAW_PLACE, RAW_TRIANGLE, SQUEEZE, THROUGHPUT};
-use crate::lanes::Real;
+use crate::lanes::chosen::Chosen;
+use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real, each};
 use crate::ray::{Hits, Rays};
 use crate::shade::look::Look;
 
@@ -43,6 +44,25 @@ impl<S: Real> Wave<S> {
         self.throughput.push(throughput);
         self.pdf.push(pdf);
         self.squeeze.push(squeeze);
+    }
+
+    /// Adds rays with open ends: the lanes `chosen` of origins, directions and throughputs, densities and squeezes.
+    #[inline(always)]
+    pub fn push_some(
+        &mut self,
+        chosen: &Chosen,
+        path: &[u32],
+        [org, dir, throughput]: [Lanes3<S::Wide>; 3],
+        [pdf, squeeze]: [S::Wide; 2],
+    ) {
+        let first = self.path.len();
+        self.path.extend(chosen.iter().map(|lane| path[lane]));
+        self.rays.put(first, chosen, [org, dir], S::Wide::splat(S::INFINITY));
+        extend(&mut self.throughput, chosen, throughput);
+        for (list, values) in [(&mut self.pdf, pdf), (&mut self.squeeze, squeeze)] {
+            list.resize(first + chosen.len(), S::ZERO);
+            chosen.pack(values, &mut list[first..]);
+        }
     }
 
     /// Ends the additions.
@@ -92,15 +112,25 @@ impl<S: Real> Shadows<S> {
         self.light.clear();
     }
 
-    /// Adds a ray.
-    pub fn push(&mut self, path: u32, org: [S; 3], dir: [S; 3], t_max: S, light: [S; 3]) {
-        self.rays.set(self.path.len(), org, dir, S::ZERO, t_max);
-        self.path.push(path);
-        self.light.push(light);
+    /// Adds rays: the lanes `chosen` of origins, directions, light and ends.
+    #[inline(always)]
+    pub fn push(&mut self, chosen: &Chosen, path: &[u32], [org, dir, light]: [Lanes3<S::Wide>; 3], t_max: S::Wide) {
+        let first = self.path.len();
+        self.path.extend(chosen.iter().map(|lane| path[lane]));
+        self.rays.put(first, chosen, [org, dir], t_max);
+        extend(&mut self.light, chosen, light);
     }
 
     /// Ends the additions.
     pub fn close(&mut self) {
         self.rays.truncate(self.path.len());
     }
+}
+
+/// Adds the lanes `chosen` of `vectors`.
+#[inline(always)]
+fn extend<S: Real>(list: &mut Vec<[S; 3]>, chosen: &Chosen, vectors: Lanes3<S::Wide>) {
+    let mut columns = [[S::ZERO; MAX_LANES]; 3];
+    columns.iter_mut().zip(vectors).for_each(|(column, x)| x.store(column));
+    list.extend(chosen.iter().map(|lane| each(|axis| columns[axis][lane])));
 }

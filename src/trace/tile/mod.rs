@@ -29,6 +29,7 @@ mod walk;
 use super::output::Output;
 use super::query::{Query, Stack};
 use super::{Engine, Generic, Scratch, stream, traverse};
+use crate::lanes::past::arrived;
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::{Object, World};
@@ -58,6 +59,10 @@ const GROUPS: usize = SETS * SET;
 
 /// Most rays in a tile.
 const BLOCK: usize = GROUPS * V::N;
+
+/// Calls with more rays than this write hits past the caches: they hold the last ones at most, and whoever asks so much at
+/// once does not read them at once.
+const MANY: usize = 2 * BLOCK;
 
 /// Half the distance from 1 to the next number: the largest relative error of one operation.
 const HALF_ULP: f32 = f32::EPSILON / 2.0;
@@ -112,6 +117,8 @@ struct Job<'a> {
     output: Output<'a, f32>,
     /// Most groups in a tile: 64, 16, 4 or 1.
     most: usize,
+    /// Whether hits are written past the caches.
+    past: bool,
 }
 
 /// Whether tiles can trace a world: one object in world space, of triangles only; or (not for `exact` tiles) instances
@@ -222,7 +229,9 @@ impl Job<'_> {
         let exact = Exact { bundle, world: self.world, object: self.world.first_object() };
         walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
-            self.output.prefetch(bundle.first + (g + bundle::AHEAD) * V::N);
+            if !self.past {
+                self.output.prefetch(bundle.first + (g + bundle::AHEAD) * V::N);
+            }
             self.finish::<ANY, EXACT, COUNT>(&exact, g);
         }
         true
@@ -246,7 +255,7 @@ impl Job<'_> {
         }
         if !EXACT && odd == 0 {
             if let Output::Closest(hits) = &mut self.output {
-                self.memory.groups.store_own(g, self.rays, hits, first);
+                self.memory.groups.store_own(g, self.rays, hits, first, self.past);
             }
             return;
         }
@@ -339,11 +348,17 @@ fn call<const ANY: bool, const EXACT: bool>(
 ) {
     let Scratch { single: super::Memory { stack, stream }, tile: memory, .. } = scratch;
     stack.reserve(world.stack_bound());
+    let past = rays.len() > MANY;
     match counters {
-        Some(counters) => Job { world, rays, memory, stack, stream, counters, output, most }.run::<ANY, EXACT, true>(),
+        Some(counters) => {
+            Job { world, rays, memory, stack, stream, counters, output, most, past }.run::<ANY, EXACT, true>();
+        }
         None => {
             let counters = &mut Counters::default();
-            Job { world, rays, memory, stack, stream, counters, output, most }.run::<ANY, EXACT, false>();
+            Job { world, rays, memory, stack, stream, counters, output, most, past }.run::<ANY, EXACT, false>();
         }
+    }
+    if past {
+        arrived();
     }
 }

@@ -8,6 +8,7 @@ use super::exact::Exact;
 use super::groups::{Groups, NO_SLOT, merge};
 use super::shapes;
 use super::{Mask, V, select};
+use crate::lanes::past::store_past;
 use crate::lanes::words::{below, positions};
 use crate::lanes::{LaneMask, Lanes, each};
 use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
@@ -260,22 +261,25 @@ impl Groups {
         (found, t, or_zero(u), or_zero(v))
     }
 
-    /// Writes a group's own hits and misses; `first` is its first ray.
+    /// Writes a group's own hits and misses; `first` is its first ray. `past`: past the caches.
     #[inline(always)]
-    pub fn store_own(&self, g: usize, rays: &Rays<f32>, hits: &mut Hits<f32>, first: usize) {
+    pub fn store_own(&self, g: usize, rays: &Rays<f32>, hits: &mut Hits<f32>, first: usize, past: bool) {
         let (found, t, u, v) = self.own_numbers(g, rays, first);
-        let zero = V::constant(0.0);
-        select(found, t, V::splat(f32::INFINITY)).store(&mut hits.t[first..]);
-        u.store(&mut hits.u[first..]);
-        v.store(&mut hits.v[first..]);
-        hits.prim[first..first + V::N].copy_from_slice(&self.of[g].slot);
+        let store = |x: &[u32; 16], to: &mut [u32]| match to[first..].first_chunk_mut() {
+            Some(to) if past => store_past(x, to),
+            Some(to) => *to = *x,
+            None => {}
+        };
+        let t = select(found, t, V::splat(f32::INFINITY));
+        for (x, to) in [(t, &mut hits.t), (u, &mut hits.u), (v, &mut hits.v)] {
+            store(&bytemuck::cast(x.to_array()), bytemuck::cast_slice_mut(to));
+        }
+        store(&self.of[g].slot, &mut hits.prim);
         if self.many {
-            hits.inst[first..first + V::N].copy_from_slice(&self.inst[g]);
-            return;
+            return store(&self.inst[g], &mut hits.inst);
         }
         let none = V::splat(f32::from_bits(INVALID_ID));
-        let inst: [u32; 16] = bytemuck::cast(select(found, zero, none).to_array());
-        hits.inst[first..first + V::N].copy_from_slice(&inst);
+        store(&bytemuck::cast(select(found, V::constant(0.0), none).to_array()), &mut hits.inst);
     }
 
     /// A group's own hits for the packet kernel to go on with.
