@@ -78,15 +78,26 @@ fn a_polysolid_is_one_too() {
 }
 
 #[test]
-fn surfaces_and_open_bots_are_named() {
-    let problem = |mode: &str, faces: &str| {
+fn surfaces_and_open_bots_are_named_and_left_out_if_asked() {
+    let described = |mode: &str, faces: &str, lenient: bool| {
         let text = format!(
-            "title {{t}}\nunits mm\nput body bot mode {mode} orient no V {{{{0 0 0}} {{1 0 0}} {{0 1 0}} {{0 0 1}}}} F {{{faces}}}\n\
-             put r comb region yes tree {{l body}}\n"
+            "title {{t}}\nunits mm\n\
+             put body bot mode {mode} orient no V {{{{0 0 0}} {{1 0 0}} {{0 1 0}} {{0 0 1}}}} F {{{faces}}}\n\
+             put ball ell V {{9 9 9}} A {{1 0 0}} B {{0 1 0}} C {{0 0 1}}\n\
+             put r comb region yes tree {{l body}}\nput s comb region yes tree {{l ball}}\n"
         );
         let database = parse(Path::new("d.asc"), text.as_bytes()).unwrap();
-        describe(Path::new("d.asc"), "d", &database, &Options::default()).unwrap_err().to_string()
+        describe(Path::new("d.asc"), "d", &database, &Options { lenient, ..Options::default() })
     };
-    let surface = problem("surf", "{0 1 2} {0 1 3} {0 2 3} {1 2 3}");
-    assert!(surface.contains("surface") && surface.contains("body"), "{surface}");
+    let closed = "{0 1 2} {0 1 3} {0 2 3} {1 2 3}";
+    assert!(described("volume", closed, false).is_ok());
+    for (mode, faces, what) in [("surf", closed, "surface"), ("volume", "{0 1 2} {0 1 3} {0 2 3}", "not closed")] {
+        let error = described(mode, faces, false).unwrap_err().to_string();
+        assert!(error.contains(what) && error.contains("body") && error.contains("d.asc:3"), "{error}");
+        let left = described(mode, faces, true).unwrap();
+        assert!(left.warnings.iter().any(|warning| warning.contains("body")), "{:?}", left.warnings);
+        let world = World::<f64>::compile(&left, Preset::Balanced).unwrap();
+        let low = world.bounds().unwrap().0;
+        assert!((low - 8.0).abs().max_element() < 1e-12, "the rest is there: {low}");
+    }
 }

@@ -16,7 +16,7 @@ use crate::lanes::compiled_isa;
 use crate::measure::answers::Answers;
 use crate::measure::raysets::{Query, split};
 use crate::measure::stats::{Summary, summary};
-use crate::measure::timing::{Series, Tracer, Workers, interleave};
+use crate::measure::timing::{Load, Series, Tracer, Workers, interleave};
 use crate::measure::truth;
 use crate::ray::{Counters, Rays};
 use crate::reference::Oracle;
@@ -173,11 +173,11 @@ fn trace<S: Engines>(args: &TraceArgs, query: Query, description: &Description, 
     let engine = args.engine.find::<S>()?;
     let workers = Workers::new(args.threads.count())?;
     let world = workers.install(|| World::<S>::compile(description, args.scene.options.build()))?;
-    let batches = split::<S>(rays);
+    let batches = split::<S>(rays, workers.threads());
     let answers = checked(&workers, engine, &world, &batches, query)?;
 
     let mut series = [Series::new(Tracer::Engine(engine), answers)];
-    interleave(&workers, &world, &batches, &mut series, (0, args.repeat), &stopped)?;
+    interleave(&workers, &world, Load::packed(&batches), &mut series, (0, args.repeat), &stopped)?;
     let [Series { answers, seconds, .. }] = series;
     if let Some(path) = &args.hits {
         match &answers {

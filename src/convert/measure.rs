@@ -23,11 +23,6 @@ pub struct Distances {
 }
 
 impl Distances {
-    /// The larger ones.
-    pub fn max(self, o: Self) -> Self {
-        Self { mesh: self.mesh.max(o.mesh), solid: self.solid.max(o.solid) }
-    }
-
     /// The largest.
     pub fn largest(&self) -> f64 {
         self.mesh.max(self.solid)

@@ -15,6 +15,7 @@
 mod ftz;
 mod isa;
 mod pair;
+pub mod past;
 mod scalar;
 pub mod space;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]

@@ -1,6 +1,6 @@
 //! Vectors of space, and the few functions of sampling, over lanes.
 
-use super::{Lanes, Lanes3, dot};
+use super::{Lanes, Lanes3, dot, map3};
 
 /// Sum.
 #[inline(always)]
@@ -23,7 +23,7 @@ pub fn times<V: Lanes>(a: Lanes3<V>, b: Lanes3<V>) -> Lanes3<V> {
 /// `a` times the number `s`.
 #[inline(always)]
 pub fn scale<V: Lanes>(a: Lanes3<V>, s: V) -> Lanes3<V> {
-    a.map(|x| x * s)
+    map3(a, |x| x * s)
 }
 
 /// `a` where the mask is set, else `b`.

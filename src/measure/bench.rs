@@ -8,10 +8,10 @@ use crate::measure::answers::Answers;
 use crate::measure::explain::{self, Costs, Limit};
 use crate::measure::eye::{Framing, View};
 use crate::measure::peers::{Guest, Invitation, Peer};
-use crate::measure::raysets::{RayKind, convert};
+use crate::measure::raysets::{RayKind, calls, convert};
 use crate::measure::rows::{Outcome, PeerRow, Row, SceneFacts};
 use crate::measure::stats::{median, paired_ratio_median, summary};
-use crate::measure::timing::{Series, Tracer, Workers, interleave};
+use crate::measure::timing::{Load, Series, Tracer, Workers, interleave};
 use crate::measure::truth;
 use crate::ray::{Counters, Rays};
 use crate::reference::{MARGIN_FACTOR, Oracle};
@@ -85,7 +85,13 @@ pub fn scene<S: Engines>(
     let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests, costs };
     for &kind in &plan.kinds {
         let rays = workers.install(|| view.rays(&world, kind))?;
-        subject.class(kind, &convert(&rays), plan.repeat, stop, report)?;
+        if kind == RayKind::Camera {
+            let maker = |tile: usize, rays: &mut Rays<S>| view.make(tile, rays);
+            let load = Load { batches: &convert(&rays), maker: Some(&maker) };
+            subject.class(kind, load, plan.repeat, stop, report)?;
+        } else {
+            subject.class(kind, Load::packed(&calls(&rays, workers.threads())), plan.repeat, stop, report)?;
+        }
     }
     Ok(())
 }
@@ -113,12 +119,12 @@ impl<S: Engines> Subject<'_, S> {
     fn class(
         &self,
         kind: RayKind,
-        batches: &[Rays<S>],
+        load: Load<'_, S>,
         repeat: u32,
         stop: &dyn Fn() -> bool,
         report: &mut dyn FnMut(Row),
     ) -> Result<()> {
-        let query = kind.query();
+        let (query, batches) = (kind.query(), load.batches);
         let rays: u64 = batches.iter().map(|b| b.len() as u64).sum();
         let mut scalar = Answers::new(query, batches);
         self.workers.pass(engine::<S>("scalar")?, self.world, batches, &mut scalar);
@@ -141,7 +147,7 @@ impl<S: Engines> Subject<'_, S> {
                 }),
             });
         }
-        interleave(self.workers, self.world, batches, &mut series, (WARM_UP, repeat), stop)?;
+        interleave(self.workers, self.world, load, &mut series, (WARM_UP, repeat), stop)?;
         self.rows(kind, batches, rays, entries, &series).into_iter().for_each(report);
         Ok(())
     }

@@ -25,6 +25,8 @@ pub struct View {
     pub setting: Setting,
     /// Pixels of the picture.
     pub pixels: u64,
+    camera: Camera,
+    tiling: Tiling,
 }
 
 impl View {
@@ -42,7 +44,10 @@ impl View {
     ) -> Result<Self> {
         let bounds = world.bounds();
         let camera = camera(bounds)?;
-        let primary = primary_rays(&camera, size)?;
+        let (width, height) = size;
+        let tiling = Tiling::new(width, height, FILE_TILE)?;
+        let eye = Camera::new(&camera, f64::from(width) / f64::from(height))?;
+        let primary = primary_rays(&eye, &tiling);
         let scalar = engine::<S>("scalar")?;
         let starts = Starts::trace(world, scalar, &primary);
         // A scene of nothing but half-spaces has no diagonal; its lengths are then taken as unit length.
@@ -51,7 +56,13 @@ impl View {
         let clearance = clearance(world, scalar, camera.eye, up);
         let light = light_for(&description.lights, camera.eye, up, diagonal, clearance);
         let pixels = u64::from(size.0) * u64::from(size.1);
-        Ok(Self { primary, starts, setting: Setting { light, diagonal, seed }, pixels })
+        let setting = Setting { light, diagonal, seed };
+        Ok(Self { primary, starts, setting, pixels, camera: eye, tiling })
+    }
+
+    /// Makes `rays` the primary rays of tile `tile`: batch `tile` of [`Self::primary`].
+    pub fn make<S: Real>(&self, tile: usize, rays: &mut Rays<S>) {
+        make(&self.camera, &self.tiling, tile as u32, rays);
     }
 
     /// The rays of class `kind` in `world`, on the current rayon pool: a tile per batch, or as many scattered rays
@@ -69,17 +80,19 @@ impl View {
     }
 }
 
-/// The rays of `camera` through the pixel centres of a `size` picture, in ray-file order.
-fn primary_rays(camera: &CameraDescription, (width, height): (u32, u32)) -> Result<Vec<Rays<f32>>> {
-    let tiling = Tiling::new(width, height, FILE_TILE)?;
-    let camera = Camera::new(camera, f64::from(width) / f64::from(height))?;
-    let whole = PixelRect { x0: 0, y0: 0, x1: width, y1: height };
+/// The rays of `camera` through the pixel centres of the picture, in ray-file order.
+fn primary_rays(camera: &Camera, tiling: &Tiling) -> Vec<Rays<f32>> {
     let tile = |tile| {
         let mut rays = Rays::new(0);
-        fill_tile(&camera, &tiling, tile, whole, SubPixel::Anchor, &mut rays);
+        make(camera, tiling, tile, &mut rays);
         rays
     };
-    Ok((0..tiling.tiles()).into_par_iter().map(tile).collect())
+    (0..tiling.tiles()).into_par_iter().map(tile).collect()
+}
+
+fn make<S: Real>(camera: &Camera, tiling: &Tiling, tile: u32, rays: &mut Rays<S>) {
+    let whole = PixelRect { x0: 0, y0: 0, x1: tiling.width(), y1: tiling.height() };
+    fill_tile(camera, tiling, tile, whole, SubPixel::Anchor, rays);
 }
 
 /// Distance from `org` along unit `dir` to the first surface; infinite if there is none.

@@ -126,7 +126,7 @@ pub fn judge(
         return Err(Error::Usage(format!("the files answer {a} and {b} rays, the ray file has {}", rays.len())));
     }
     let oracle = Oracle::new(&Assembly::new(scene.borrow())?);
-    let batches = split::<f32>(rays);
+    let batches = split::<f32>(rays, 1);
     let [a, b] = answers.map(|answers| {
         let batched = rebatched(answers, &batches);
         truth::judge_rays(&oracle, OWN_MARGIN_FACTOR, &batches, &batched, &report.unlike)

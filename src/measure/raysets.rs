@@ -26,6 +26,11 @@ pub use scatter::scatter;
 /// Rays per batch: one tile of 32x32 pixels.
 pub const BATCH: usize = 1024;
 
+/// Most batches in one call of an engine under the clock.
+const MOST_BATCHES: usize = 4;
+/// Calls that each thread has at least, if there are as many batches.
+const CALLS_PER_THREAD: usize = 32;
+
 /// Length of an ambient occlusion ray relative to the diagonal of the scene's bounds.
 pub const AO_REACH: f64 = 0.05;
 
@@ -70,6 +75,8 @@ impl Query {
 pub enum RayKind {
     /// From the camera through the pixels.
     Primary,
+    /// The same rays, but made under the clock, a tile at a time in memory that stays in the caches: what a renderer has.
+    Camera,
     /// From the primary hit to one point light (see [`light_for`]): `t` in [0, 1], the light at 1.
     Shadow,
     /// One ray per hit, cosine distributed around the geometric normal on the ray's side, [`AO_REACH`] long.
@@ -88,8 +95,9 @@ pub enum RayKind {
 
 impl RayKind {
     /// All classes, in the order of tables.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Primary,
+        Self::Camera,
         Self::Shadow,
         Self::Ao,
         Self::Reflect,
@@ -103,6 +111,7 @@ impl RayKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Primary => "primary",
+            Self::Camera => "camera",
             Self::Shadow => "shadow",
             Self::Ao => "ao",
             Self::Reflect => "reflect",
@@ -124,7 +133,7 @@ impl RayKind {
     /// The class whose hits these rays start from; `None` if they start from none.
     pub fn parent(self) -> Option<Self> {
         match self {
-            Self::Primary | Self::Scatter => None,
+            Self::Primary | Self::Camera | Self::Scatter => None,
             Self::Shadow | Self::Ao | Self::Reflect | Self::Diffuse => Some(Self::Primary),
             Self::Diffuse2 => Some(Self::Diffuse),
             Self::Diffuse3 => Some(Self::Diffuse2),
@@ -150,17 +159,39 @@ pub fn convert<S: Real>(batches: &[Rays<f32>]) -> Vec<Rays<S>> {
     batches.iter().map(|b| convert_range(b, 0..b.len())).collect()
 }
 
-/// One long batch (a ray file) cut into batches of [`BATCH`], in the engine's precision.
-pub fn split<S: Real>(rays: &Rays<f32>) -> Vec<Rays<S>> {
-    (0..rays.len()).step_by(BATCH).map(|at| convert_range(rays, at..rays.len().min(at + BATCH))).collect()
+/// One long batch (a ray file) cut into what engines get in one call when `threads` threads share it, in the engine's
+/// precision.
+pub fn split<S: Real>(rays: &Rays<f32>, threads: usize) -> Vec<Rays<S>> {
+    let call = call_len(rays.len(), threads);
+    (0..rays.len()).step_by(call).map(|at| convert_range(rays, at..rays.len().min(at + call))).collect()
+}
+
+/// The same of many batches of [`BATCH`] rays, of which the last may be shorter.
+pub fn calls<S: Real>(batches: &[Rays<f32>], threads: usize) -> Vec<Rays<S>> {
+    let count = batches.iter().map(Rays::len).sum();
+    let joined = batches.chunks(call_len(count, threads) / BATCH).map(|chunk| {
+        let mut rays = Rays::new(chunk.iter().map(Rays::len).sum());
+        let all = chunk.iter().flat_map(|batch| (0..batch.len()).map(move |i| (batch, i)));
+        all.enumerate().for_each(|(slot, (from, i))| copy(from, i, &mut rays, slot));
+        rays
+    });
+    joined.collect()
+}
+
+/// Rays of one call of an engine: as many as let it fetch ahead, as few as let `threads` threads share `count` rays evenly.
+fn call_len(count: usize, threads: usize) -> usize {
+    let fair = count / (CALLS_PER_THREAD * threads.max(1));
+    (fair / BATCH).clamp(1, MOST_BATCHES) * BATCH
+}
+
+fn copy<S: Real>(from: &Rays<f32>, i: usize, to: &mut Rays<S>, slot: usize) {
+    let cast = |x: f32| S::from_f64(f64::from(x));
+    to.set(slot, from.org(i).map(cast), from.dir(i).map(cast), cast(from.t_min[i]), cast(from.t_max[i]));
 }
 
 fn convert_range<S: Real>(from: &Rays<f32>, range: std::ops::Range<usize>) -> Rays<S> {
-    let cast = |x: f32| S::from_f64(f64::from(x));
     let mut to = Rays::new(range.len());
-    for (slot, i) in range.enumerate() {
-        to.set(slot, from.org(i).map(cast), from.dir(i).map(cast), cast(from.t_min[i]), cast(from.t_max[i]));
-    }
+    range.enumerate().for_each(|(slot, i)| copy(from, i, &mut to, slot));
     to
 }
 
@@ -203,7 +234,7 @@ impl Starts {
         self.batches.iter().flatten().flatten().count()
     }
 
-    /// The secondary rays of `kind`; [`RayKind::Primary`] and [`RayKind::Scatter`] are not made from hits: for
+    /// The secondary rays of `kind`; [`RayKind::Primary`], [`RayKind::Camera`] and [`RayKind::Scatter`] are not made from hits: for
     /// them all rays are dead.
     pub fn rays(&self, kind: RayKind, setting: &Setting) -> Vec<Rays<f32>> {
         let batch_rays = |(b, starts): (usize, &Vec<Option<Start>>)| {
@@ -264,7 +295,7 @@ fn secondary(kind: RayKind, at: &Start, setting: &Setting, random: [f64; 2]) -> 
     }
     let cosine = || cosine_hemisphere(at.normal, random);
     let (dir, t_max) = match kind {
-        RayKind::Primary | RayKind::Scatter => return None,
+        RayKind::Primary | RayKind::Camera | RayKind::Scatter => return None,
         RayKind::Shadow => {
             // A surface that faces away from the light is left on its far side, as a shader would leave it.
             let normal = if (setting.light - at.position).dot(at.normal) < 0.0 { -at.normal } else { at.normal };

@@ -5,6 +5,9 @@
 //! each is pinned to one core where the system allows it.
 //!
 //! Peers run on the same threads by the same rule. Their rays are packed anew before each pass, outside the clock.
+//!
+//! Rays that a camera makes are another matter: there the clock covers making and, for peers, packing them too, a batch at
+//! a time.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -110,6 +113,33 @@ impl Workers {
         })
     }
 
+    /// One timed pass over batches that `maker` makes under the clock: closest hits into `out`, one per batch.
+    fn made_pass<S: Real>(
+        &self,
+        tracer: Tracer<'_, S>,
+        world: &World<S>,
+        maker: &Maker<'_, S>,
+        out: &mut [Hits<S>],
+    ) -> f64 {
+        let made: Vec<_> = self.scratches.iter().map(|_| Mutex::new(Rays::new(0))).collect();
+        let jobs = out.iter_mut().enumerate().collect();
+        let seconds = self.pool.install(|| {
+            self.timed(jobs, |(number, hits): &mut (usize, &mut Hits<S>), scratch| {
+                let thread = rayon::current_thread_index().unwrap_or(0);
+                let mut rays = made[thread].lock().unwrap_or_else(PoisonError::into_inner);
+                maker(*number, &mut rays);
+                match tracer {
+                    Tracer::Engine(engine) => engine.intersect(world, &rays, hits, scratch, None),
+                    Tracer::Peer(peer) => peer.pack(&rays, Query::Closest).intersect(hits),
+                }
+            })
+        });
+        if let Tracer::Peer(peer) = tracer {
+            out.iter_mut().for_each(|hits| rename(peer.ids(), hits));
+        }
+        seconds
+    }
+
     /// Seconds of doing all `jobs`, each with the scratch of the thread that takes it.
     fn timed<T: Send>(&self, mut jobs: Vec<T>, work: impl Fn(&mut T, &mut Scratch) + Sync) -> f64 {
         let start = Instant::now();
@@ -148,6 +178,25 @@ impl Workers {
     }
 }
 
+/// Makes the rays of the batch of that number, in memory that is used again and again.
+pub type Maker<'a, S> = dyn Fn(usize, &mut Rays<S>) + Sync + 'a;
+
+/// What is traced under the clock.
+#[derive(Clone, Copy)]
+pub struct Load<'a, S> {
+    /// The rays.
+    pub batches: &'a [Rays<S>],
+    /// Makes them anew, if that is to be timed too.
+    pub maker: Option<&'a Maker<'a, S>>,
+}
+
+impl<'a, S> Load<'a, S> {
+    /// Rays that are packed in memory.
+    pub fn packed(batches: &'a [Rays<S>]) -> Self {
+        Self { batches, maker: None }
+    }
+}
+
 /// Every batch with its output slot.
 fn jobs<'a, S, O>(batches: &'a [Rays<S>], out: &'a mut [O]) -> Vec<(&'a Rays<S>, &'a mut O)> {
     batches.iter().zip(out).collect()
@@ -164,10 +213,12 @@ pub enum Tracer<'a, S> {
 
 impl<S: Real> Tracer<'_, S> {
     /// One timed pass, see [`Workers::pass`].
-    pub fn pass(self, workers: &Workers, world: &World<S>, batches: &[Rays<S>], answers: &mut Answers<S>) -> f64 {
-        match self {
-            Self::Engine(engine) => workers.pass(engine, world, batches, answers),
-            Self::Peer(peer) => workers.peer_pass(peer, batches, answers),
+    pub fn pass(self, workers: &Workers, world: &World<S>, load: Load<'_, S>, answers: &mut Answers<S>) -> f64 {
+        let Load { batches, maker } = load;
+        match (self, maker, answers) {
+            (_, Some(maker), Answers::Closest(out)) => workers.made_pass(self, world, maker, out),
+            (Self::Engine(engine), _, answers) => workers.pass(engine, world, batches, answers),
+            (Self::Peer(peer), _, answers) => workers.peer_pass(peer, batches, answers),
         }
     }
 }
@@ -197,7 +248,7 @@ impl<'a, S: Real> Series<'a, S> {
 pub fn interleave<S: Real>(
     workers: &Workers,
     world: &World<S>,
-    batches: &[Rays<S>],
+    load: Load<'_, S>,
     series: &mut [Series<'_, S>],
     (warm_up, repeat): (u32, u32),
     stop: &dyn Fn() -> bool,
@@ -207,7 +258,7 @@ pub fn interleave<S: Real>(
             if stop() {
                 return Err(Error::Interrupted);
             }
-            let seconds = one.tracer.pass(workers, world, batches, &mut one.answers);
+            let seconds = one.tracer.pass(workers, world, load, &mut one.answers);
             if round >= warm_up {
                 one.seconds.push(seconds);
             }
@@ -249,7 +300,7 @@ mod tests {
         let workers = Workers::new(1).unwrap();
         let empty = Answers::new(Query::Closest, &batches);
         let mut series: Vec<_> = engines.iter().map(|e| Series::new(Tracer::Engine(e), empty.clone())).collect();
-        interleave(&workers, &world, &batches, &mut series, (1, 3), &|| false).unwrap();
+        interleave(&workers, &world, Load::packed(&batches), &mut series, (1, 3), &|| false).unwrap();
         assert_eq!(series.iter().map(|s| s.seconds.len()).collect::<Vec<_>>(), [3, 3]);
         drop(series);
         assert_eq!(order.lock().unwrap().as_str(), "ABABABAB");
@@ -262,7 +313,7 @@ mod tests {
         let mut series = [Series::new(Tracer::Engine(&engine), Answers::new(Query::Any, &batches))];
         let asked = AtomicU32::new(0);
         let stop = || asked.fetch_add(1, Ordering::Relaxed) == 2;
-        let result = interleave(&Workers::new(1).unwrap(), &world, &batches, &mut series, (0, 10), &stop);
+        let result = interleave(&Workers::new(1).unwrap(), &world, Load::packed(&batches), &mut series, (0, 10), &stop);
         assert!(matches!(result, Err(Error::Interrupted)));
         assert_eq!(series[0].seconds.len(), 2);
     }

@@ -51,7 +51,17 @@ impl Patch {
             }));
         }
         let kept = self.kept.iter().map(|&number| &samples[number as usize]);
-        for (channel, values) in channels.iter().zip(&mut self.values) {
+        let (color, further) = self.values.split_at_mut(COLOR.len());
+        if let [PlaneData::F32(r), PlaneData::F32(g), PlaneData::F32(b), PlaneData::F32(a)] = color {
+            [&mut *r, &mut *g, &mut *b, &mut *a].into_iter().for_each(Vec::clear);
+            for sample in kept.clone() {
+                r.push(sample.radiance.x as f32);
+                g.push(sample.radiance.y as f32);
+                b.push(sample.radiance.z as f32);
+                a.push(sample.alpha as f32);
+            }
+        }
+        for (channel, values) in channels[COLOR.len()..].iter().zip(further) {
             match (channel.get, values) {
                 (Get::F32(get), PlaneData::F32(values)) => {
                     values.clear();

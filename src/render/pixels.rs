@@ -9,12 +9,22 @@ pub(super) fn begin(sample: &mut Sample) {
     sample.square = brightness(sample.radiance).powi(2);
 }
 
-/// Adds `sample` to the sum of a pixel's samples. Colours, coverage, normals and costs add up (misses count as 0);
-/// distance, position and ids come together from the nearest sample, the first of equals.
-pub(super) fn add(sum: &mut Sample, sample: &Sample) {
+/// Makes the sum of one sample the value of its pixel: the same as [`mean`].
+pub(super) fn alone(sum: &mut Sample) {
+    (sum.square, sum.samples) = (0.0, 1);
+}
+
+/// Adds what every picture shows of `sample` to the sum of a pixel's samples.
+pub(super) fn add_light(sum: &mut Sample, sample: &Sample) {
     sum.radiance += sample.radiance;
     sum.square += brightness(sample.radiance).powi(2);
     sum.alpha += sample.alpha;
+}
+
+/// Adds `sample` to the sum of a pixel's samples. Colours, coverage, normals and costs add up (misses count as 0);
+/// distance, position and ids come together from the nearest sample, the first of equals.
+pub(super) fn add(sum: &mut Sample, sample: &Sample) {
+    add_light(sum, sample);
     sum.normal += sample.normal;
     sum.shading_normal += sample.shading_normal;
     sum.albedo += sample.albedo;
@@ -45,9 +55,6 @@ pub(super) fn variance(sum: &Sample, count: u32) -> f64 {
 /// The pixel's value from the sum of its `spp` samples.
 pub(super) fn mean(sum: &Sample, spp: u32) -> Sample {
     let (variance, samples) = (variance(sum, spp), spp);
-    if spp == 1 {
-        return Sample { square: variance, samples, ..*sum };
-    }
     let spp = f64::from(spp);
     Sample {
         radiance: sum.radiance / spp,
@@ -82,6 +89,8 @@ mod tests {
             begin(&mut first);
             add(&mut sum, &sample);
             assert_eq!(first, sum);
+            alone(&mut first);
+            assert_eq!(first, mean(&sum, 1));
         }
     }
 }

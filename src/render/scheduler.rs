@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::aov::Channel;
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{Patch, channels, empty_film};
-use super::pixels::{add, begin, mean, variance};
+use super::pixels::{add, add_light, alone, begin, mean, variance};
 use super::tally::Tally;
 use crate::camera::{Camera, PixelRect, Tiling, fill_tile, morton_decode};
 use crate::error::{Result, locked};
@@ -206,6 +206,8 @@ impl<S: Real> Job<'_, S> {
             if sums.count == 0 {
                 std::mem::swap(&mut sums.pixels, &mut memory.samples);
                 sums.pixels.iter_mut().for_each(begin);
+            } else if self.options.aovs.is_empty() {
+                sums.pixels.iter_mut().zip(&memory.samples).for_each(|(sum, sample)| add_light(sum, sample));
             } else {
                 sums.pixels.iter_mut().zip(&memory.samples).for_each(|(sum, sample)| add(sum, sample));
             }
@@ -258,7 +260,11 @@ impl<S: Real> Job<'_, S> {
 
     /// Takes what the planes get from a finished tile, whose sums become means.
     fn fill(&self, patch: &mut Patch, sums: &mut Sums, pixels: &[(u32, u32)]) {
-        sums.pixels.iter_mut().for_each(|sum| *sum = mean(sum, sums.count));
+        if sums.count == 1 {
+            sums.pixels.iter_mut().for_each(alone);
+        } else {
+            sums.pixels.iter_mut().for_each(|sum| *sum = mean(sum, sums.count));
+        }
         patch.fill(&self.channels, self.window, pixels, &sums.pixels);
     }
 }

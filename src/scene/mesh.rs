@@ -1,5 +1,7 @@
 //! Indexed triangle meshes as they come from a file: the description side, in f64.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 /// An indexed triangle mesh. Positions keep the file's values (f32 files widen exactly), indices the file's order
@@ -78,6 +80,14 @@ impl Mesh {
             }
         }
         range
+    }
+
+    /// For each vertex the first one at its place: files often give one corner several numbers. Zeros of both signs are one
+    /// place.
+    pub fn first_at_place(positions: &[DVec3]) -> Vec<u32> {
+        let mut first_at = HashMap::with_capacity(positions.len());
+        let place = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
+        positions.iter().zip(0..).map(|(p, i)| *first_at.entry(place(*p)).or_insert(i)).collect()
     }
 
     /// Volume inside, if the mesh is closed and winds counter-clockwise seen from outside (the divergence theorem).

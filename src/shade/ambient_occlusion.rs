@@ -2,8 +2,10 @@
 
 use super::sample::Sample;
 use super::shader::{Shader, Workspace};
+use super::vertices::NORMAL;
 use crate::camera::sampling::{PixelRandom, cosine_hemisphere};
 use crate::lanes::Real;
+use crate::ray::Rays;
 
 /// Name of the occlusion directions among the random dimensions of a pixel.
 const DIMENSION: u32 = 1;
@@ -13,6 +15,7 @@ impl<S: Real> Shader<'_, S> {
     /// One batch per direction number, each with one ray per first hit.
     pub(super) fn ambient_occlusion(
         &self,
+        rays: &Rays<S>,
         pixels: &[(u32, u32)],
         sample: u32,
         work: &mut Workspace<S>,
@@ -20,22 +23,25 @@ impl<S: Real> Shader<'_, S> {
     ) {
         let rounds = self.settings.ao_samples;
         let (zero, length) = (S::from_f64(0.0), S::from_f64(self.ao_length));
-        let vertices = std::mem::take(&mut work.vertices);
+        let mut vertices = std::mem::take(&mut work.vertices);
+        let mut batch = std::mem::take(&mut work.batch);
+        self.meet(rays, &work.hits, &mut vertices);
+        let met: Vec<usize> = (0..rays.len()).filter(|i| work.hits.is_hit(*i)).collect();
         for round in 0..rounds {
             let index = sample.wrapping_mul(rounds).wrapping_add(round);
-            work.batch.reset(vertices.len());
-            for (i, vertex) in vertices.iter().enumerate() {
-                let (x, y) = pixels[vertex.path as usize];
+            batch.reset(met.len());
+            for (k, &i) in met.iter().enumerate() {
+                let (x, y) = pixels[i];
                 let random = PixelRandom::new(x, y, self.settings.seed).spread(index, DIMENSION);
-                let dir = cosine_hemisphere(vertex.normal, random).to_array().map(S::from_f64);
-                work.batch.set(i, vertex.leave(), dir, zero, length);
+                let dir = cosine_hemisphere(vertices.at(NORMAL, i), random).to_array().map(S::from_f64);
+                batch.set(k, vertices.leave::<S>(i), dir, zero, length);
             }
-            work.rays.occlusion += work.batch.live_count() as u64;
-            self.occlude(work, false, |i, left| out[vertices[i].path as usize].radiance += left);
+            work.rays.occlusion += batch.live_count() as u64;
+            self.occlude(&batch, work, false, |k, left| out[met[k]].radiance += left);
         }
-        for vertex in &vertices {
-            out[vertex.path as usize].radiance /= f64::from(rounds.max(1));
+        for i in met {
+            out[i].radiance /= f64::from(rounds.max(1));
         }
-        work.vertices = vertices;
+        (work.vertices, work.batch) = (vertices, batch);
     }
 }

@@ -4,6 +4,8 @@ use glam::DVec3;
 
 use super::look::{Look, Looks, Model};
 use super::path::fresnel;
+use crate::lanes::space::{choose, scale};
+use crate::lanes::{Lanes, Lanes3, dot, each};
 use crate::scene::world::Surface;
 
 /// Rougher facets than this width are taken for diffuse: a mirror would show what they blur away.
@@ -39,58 +41,87 @@ impl Classic {
 
     /// How `look` scatters light that it meets at cosine `cos`.
     fn scattered(look: &Look, cos: f64) -> Self {
-        let (base, p) = (look.base, &look.param);
-        let plain = Self { eta: 1.0, ..Self::default() };
-        match look.model {
-            Model::Matte => Self { diffuse: base, mirror: DVec3::new(p[0], p[1], p[2]), ..plain },
+        let Terms { diffuse, mirror, through, eta } = Terms::of(look.model, look.base.to_array(), &look.param, cos);
+        let [diffuse, mirror, through] = [diffuse, mirror, through].map(DVec3::from);
+        Self { diffuse, mirror, through, eta, ..Self::default() }
+    }
+}
+
+/// What points scatter: see the fields of [`Classic`].
+#[derive(Clone, Copy, Debug)]
+pub struct Terms<V> {
+    pub diffuse: Lanes3<V>,
+    pub mirror: Lanes3<V>,
+    pub through: Lanes3<V>,
+    pub eta: V,
+}
+
+impl<V: Lanes> Terms<V> {
+    /// Those of `model` with base colour `base` and parameters `param`, for light that is met at cosine `cos`.
+    #[inline(always)]
+    pub fn of(model: Model, base: Lanes3<V>, param: &[V; 7], cos: V) -> Self {
+        let (zero, one) = (V::constant(0.0), V::constant(1.0));
+        let plain = Self { diffuse: [zero; 3], mirror: [zero; 3], through: [zero; 3], eta: one };
+        let p = param;
+        match model {
+            Model::Matte => Self { diffuse: base, mirror: [p[0], p[1], p[2]], ..plain },
             Model::SmoothConductor | Model::RoughConductor => {
-                let f = DVec3::from([0, 1, 2].map(|c| fresnel::conductor(cos, p[c], p[c + 3])));
-                Self { mirror: f, ..plain }
+                Self { mirror: each(|c| fresnel::conductor(cos, p[c], p[c + 3])), ..plain }
             }
             Model::SmoothDielectric | Model::RoughDielectric => {
                 let (f, _) = fresnel::dielectric(cos, p[0]);
-                Self { mirror: DVec3::splat(f), through: base * (1.0 - f), eta: p[0], ..plain }
+                Self { mirror: [f; 3], through: scale(base, one - f), eta: p[0], ..plain }
             }
             Model::Thin => {
                 let (f, _) = fresnel::dielectric(cos, p[0]);
-                let f = 2.0 * f / (1.0 + f);
-                Self { mirror: DVec3::splat(f), through: base * (1.0 - f), ..plain }
+                let f = (f + f) / (one + f);
+                Self { mirror: [f; 3], through: scale(base, one - f), ..plain }
             }
             Model::SmoothCoat | Model::RoughCoat => {
                 let (f, _) = fresnel::dielectric(cos, p[0]);
-                let mirror = if p[2] > MIRROR_WIDTH { DVec3::ZERO } else { DVec3::splat(f) };
-                Self { diffuse: base * (1.0 - f), mirror, ..plain }
+                let mirror = V::select(V::constant(MIRROR_WIDTH).cmp_lt(p[2]), zero, f);
+                Self { diffuse: scale(base, one - f), mirror: [mirror; 3], ..plain }
             }
             Model::MetalRough => {
                 let [metallic, width, f0, transmission] = [p[0], p[1], p[2], p[3]];
-                let body = base * (1.0 - metallic);
-                let f0 = base * metallic + DVec3::splat(f0 * (1.0 - metallic));
-                let f = DVec3::from(fresnel::schlick(cos, f0.to_array()));
-                let diffuse = body * (1.0 - transmission);
-                let through = body * transmission * (DVec3::ONE - f);
-                if width > MIRROR_WIDTH {
-                    Self { diffuse: diffuse + f0 * metallic, through, ..plain }
-                } else {
-                    Self { diffuse: diffuse * (DVec3::ONE - f), mirror: f, through, ..plain }
+                let is_rough = V::constant(MIRROR_WIDTH).cmp_lt(width);
+                let body = scale(base, one - metallic);
+                let f0 = each(|c| base[c] * metallic + f0 * (one - metallic));
+                let f = fresnel::schlick(cos, f0);
+                let diffuse = scale(body, one - transmission);
+                let spread = each(|c| f0[c].mul_add(metallic, diffuse[c]));
+                Self {
+                    diffuse: choose(is_rough, spread, each(|c| diffuse[c] * (one - f[c]))),
+                    mirror: choose(is_rough, [zero; 3], f),
+                    through: each(|c| body[c] * transmission * (one - f[c])),
+                    ..plain
                 }
             }
         }
     }
 }
 
-/// Direction `dir` (not unit) refracted at a plane with unit normal `normal`, on the side `dir` comes from, with the
-/// same length; `None` with total reflection.
-pub fn refract(dir: DVec3, normal: DVec3, eta: f64) -> Option<DVec3> {
-    let length = dir.length();
-    let unit = dir / length;
-    let cos = -unit.dot(normal);
-    let sin2 = (1.0 - cos * cos) / (eta * eta);
-    (sin2 < 1.0).then(|| (unit / eta + normal * (cos / eta - (1.0 - sin2).sqrt())) * length)
+/// Directions `dir` (not unit) refracted at planes with unit normals `normal`, on the side `dir` comes from, with the same
+/// length, and the lanes without total reflection.
+#[inline(always)]
+pub fn refracted<V: Lanes>(dir: Lanes3<V>, normal: Lanes3<V>, eta: V) -> (Lanes3<V>, V::Mask) {
+    let one = V::constant(1.0);
+    let length = dot(dir, dir).sqrt();
+    let unit = scale(dir, one / length);
+    let cos = -dot(unit, normal);
+    let sin2 = (one - cos * cos) / (eta * eta);
+    let along = cos / eta - (one - sin2).fast_max(V::constant(0.0)).sqrt();
+    (each(|i| (unit[i] / eta + normal[i] * along) * length), sin2.cmp_lt(one))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn refract(dir: DVec3, normal: DVec3, eta: f64) -> Option<DVec3> {
+        let (bent, goes_on) = refracted(dir.to_array(), normal.to_array(), eta);
+        goes_on.then(|| DVec3::from(bent))
+    }
 
     /// Snell's law at 30 degrees into glass of 1.5: sin 30 / 1.5 = 1 / 3.
     #[test]

@@ -40,6 +40,16 @@ impl Integrator {
             Self::Rt => "rt",
         }
     }
+
+    /// Whether pictures are made of what samples say of first hits.
+    pub(super) fn shows_hits(self) -> bool {
+        matches!(self, Self::Normals | Self::Depth)
+    }
+
+    /// Whether points on surfaces are worked out in lanes by [`super::Shader`] itself.
+    pub(super) fn works_on_vertices(self) -> bool {
+        matches!(self, Self::Whitted | Self::Ao)
+    }
 }
 
 impl std::str::FromStr for Integrator {

@@ -129,12 +129,17 @@ impl<'a> Looks<'a> {
         id
     }
 
-    /// What every point of material `id` scatters with, if that is the same everywhere and from both sides, none
-    /// shines, and no normal map bends the surface.
+    /// What every point of material `id` scatters with, if it [is alike](Self::is_alike), with four parameters at most.
     #[inline]
     pub fn uniform(&self, id: u32) -> Option<&Look> {
         let ready = &self.entry(id).1;
         ready.is_uniform.then_some(&ready.front)
+    }
+
+    /// Whether all points of material `id` look the same, from both sides, none shines, and no normal map bends the surface.
+    pub fn is_alike(&self, id: u32) -> bool {
+        let (material, ready) = self.entry(id);
+        ready.is_even && !matches!(material.scattering, Scattering::Dielectric { .. })
     }
 
     /// What every point of material `id` scatters with that is seen from the side of its normal (`from_front`) or from
@@ -267,6 +272,7 @@ impl Ready {
         let is_textured = t.base.is_some() || t.metallic_roughness.is_some() || t.transmission.is_some();
         let is_even = !is_textured
             && t.normal.is_none()
+            && t.occlusion.is_none()
             && material.emission == DVec3::ZERO
             && !matches!(material.scattering, Scattering::Mix { .. });
         let is_uniform = is_even

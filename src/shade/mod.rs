@@ -1,21 +1,26 @@
 //! Materials, lights and integrators: what colour a batch of rays sees.
 //!
 //! Integrators work on whole batches, never ray by ray: primary hits give a compact batch of shadow rays per light,
-//! then a compact batch of mirror rays, which is the next level's batch. Lighting itself is f64, one hit at a time,
-//! in an order that depends on the path alone, so a pixel's value does not depend on what else is in its batch.
+//! then a compact batch of mirrored and refracted rays, which is the next level's batch. Shading runs in lanes; lanes never
+//! look at each other, and terms are added in an order that depends on the path alone, so a pixel's value does not depend
+//! on what else is in its batch.
 
 mod ambient_occlusion;
+mod bare;
+mod branches;
 mod classic;
 mod integrator;
 mod lights;
 mod look;
 mod offset;
 mod path;
+mod place;
 mod rt;
 mod sample;
 mod shader;
 mod stats;
 mod through;
+mod vertices;
 mod views;
 mod whitted;
 

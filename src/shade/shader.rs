@@ -5,15 +5,17 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use super::bare::BareTriangles;
 use super::classic::Classic;
 use super::integrator::Integrator;
 use super::look::Looks;
-use super::offset::{offset_origin, position_error};
 use super::path::{PathMemory, Paths};
 use super::rt::Rt;
 use super::sample::{RayCounts, Sample};
 use super::stats::{Clock, PathStats};
 use super::through::{Again, Through, number};
+use super::vertices::Vertices;
+use super::whitted;
 use crate::camera::Camera;
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::Real;
@@ -41,33 +43,10 @@ pub struct Settings {
     pub seed: u64,
     /// Whether node visits of primary rays are counted (see [`Sample::nodes`]).
     pub cost: bool,
-    /// Whether more is wanted of first hits than radiance and coverage (only paths save the work).
+    /// Whether more is wanted of first hits than radiance and coverage (where it is not, the work is saved).
     pub first_hits: bool,
     /// Whether all engine calls count ([`Workspace::counters`]); counting kernels are slower.
     pub count: bool,
-}
-
-/// A point on a surface that a path reached.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Vertex {
-    /// Which sample the path belongs to.
-    pub path: u32,
-    pub position: DVec3,
-    /// Bound of the position's error per axis.
-    pub error: DVec3,
-    /// Unit, turned to the side the ray came from.
-    pub normal: DVec3,
-    /// Unit shading normal on the same side.
-    pub shading_normal: DVec3,
-    /// Direction the ray came along, not unit.
-    pub dir: DVec3,
-    pub material: u32,
-    /// What the point does with light from the direction it is seen along.
-    pub classic: Classic,
-    /// Share of ambient light that arrives.
-    pub ambient: f64,
-    /// What of this point's radiance reaches the eye.
-    pub throughput: DVec3,
 }
 
 /// Working memory of one thread, and what was counted in it.
@@ -82,7 +61,8 @@ pub struct Workspace<S> {
     pub(super) clock: Clock,
     pub(super) scratch: Scratch,
     pub(super) hits: Hits<S>,
-    pub(super) vertices: Vec<Vertex>,
+    pub(super) whitted: whitted::Memory<S>,
+    pub(super) vertices: Vertices<S>,
     pub(super) batch: Rays<S>,
     pub(super) occluded: Vec<u8>,
     again: Again<S>,
@@ -101,7 +81,8 @@ impl<S: Real> Default for Workspace<S> {
             clock: Clock::default(),
             scratch: Scratch::default(),
             hits: Hits::new(0),
-            vertices: Vec::new(),
+            whitted: whitted::Memory::default(),
+            vertices: Vertices::default(),
             batch: Rays::new(0),
             occluded: Vec::new(),
             again: Again::default(),
@@ -135,6 +116,9 @@ pub struct Shader<'a, S: Real> {
     /// Length of occlusion rays, scene units.
     pub(super) ao_length: f64,
     pub(super) looks: Arc<Looks<'a>>,
+    /// Whether some hits come out of the world in lanes.
+    pub(super) has_facets: bool,
+    pub(super) bare: BareTriangles<S>,
     rt: Option<Rt>,
     paths: Option<Paths<'a, S>>,
 }
@@ -154,6 +138,11 @@ impl<'a, S: Real> Shader<'a, S> {
         let looks = Arc::new(Looks::new(description));
         let paths = (settings.integrator == Integrator::Path)
             .then(|| Paths::new(world, description, looks.clone(), engine, &settings));
+        let bare = if settings.integrator.works_on_vertices() {
+            BareTriangles::new(world, &looks)
+        } else {
+            BareTriangles::default()
+        };
         let lights = if description.lights.is_empty() { vec![default_light] } else { description.lights.clone() };
         Self {
             world,
@@ -166,6 +155,8 @@ impl<'a, S: Real> Shader<'a, S> {
             ambient: description.ambient,
             settings,
             ao_length: if ao_length.is_nan() { f64::INFINITY } else { ao_length },
+            has_facets: world.has_facets(),
+            bare,
             rt: None,
             paths,
         }
@@ -179,7 +170,8 @@ impl<'a, S: Real> Shader<'a, S> {
     }
 
     /// What each ray of the primary batch `rays` sees, into `out` (made as long as the batch). Ray `i` belongs to
-    /// pixel `pixels[i]` and is that pixel's sample number `sample`. Dead rays give [`Sample::MISS`].
+    /// pixel `pixels[i]` and is that pixel's sample number `sample`. Dead rays give [`Sample::MISS`]. Where no first hits
+    /// are wanted, only radiance and coverage mean something.
     pub fn shade(
         &self,
         rays: &Rays<S>,
@@ -188,8 +180,13 @@ impl<'a, S: Real> Shader<'a, S> {
         work: &mut Workspace<S>,
         out: &mut Vec<Sample>,
     ) {
-        out.clear();
-        out.resize(rays.len(), Sample::MISS);
+        let shows_hits = self.settings.first_hits || self.settings.cost || self.settings.integrator.shows_hits();
+        if shows_hits || out.len() != rays.len() {
+            out.clear();
+            out.resize(rays.len(), Sample::MISS);
+        } else {
+            out.iter_mut().for_each(|sample| (sample.radiance, sample.alpha) = (DVec3::ZERO, 0.0));
+        }
         work.clock.start(&work.rays);
         work.rays.primary += rays.live_count() as u64;
         if let (Integrator::Rt, Some(rt)) = (self.settings.integrator, &self.rt) {
@@ -206,29 +203,18 @@ impl<'a, S: Real> Shader<'a, S> {
         } else {
             self.intersect(rays, work, |i, layer| self.number(pixels[i], sample, 0, layer));
         }
-        work.vertices.clear();
-        for i in 0..rays.len() {
-            if !work.hits.is_hit(i) {
-                continue;
+        for i in (0..rays.len()).filter(|i| work.hits.is_hit(*i)) {
+            out[i].alpha = 1.0;
+            if shows_hits {
+                self.show(rays, &work.hits, i, &mut out[i]);
             }
-            let vertex = self.vertex(rays, &work.hits, i, i as u32, DVec3::ONE);
-            work.vertices.push(vertex);
-            let seen = &mut out[i];
-            seen.alpha = 1.0;
-            seen.distance = work.hits.t[i].to_f64() * vertex.dir.length();
-            seen.position = vertex.position;
-            seen.normal = vertex.normal;
-            seen.shading_normal = vertex.shading_normal;
-            seen.material = vertex.material;
-            seen.albedo = vertex.classic.base;
-            (seen.inst, seen.prim) = (work.hits.inst[i], work.hits.prim[i]);
         }
         match self.settings.integrator {
             // Without regions to look at, `rt`'s model has nothing to say.
             Integrator::Whitted | Integrator::Rt | Integrator::Path => self.whitted(rays, pixels, sample, work, out),
             view => {
                 match view {
-                    Integrator::Ao => self.ambient_occlusion(pixels, sample, work, out),
+                    Integrator::Ao => self.ambient_occlusion(rays, pixels, sample, work, out),
                     Integrator::Normals => super::views::normals(out),
                     Integrator::Depth => super::views::depth(out),
                     _ => super::views::cost(out),
@@ -256,13 +242,19 @@ impl<'a, S: Real> Shader<'a, S> {
         work.clock.tracing += clock.elapsed();
     }
 
-    /// Calls `lit` with the number of each ray of `work.batch` that is not occluded, and the share of its light that
-    /// arrives; `glass` lets light pass through it.
-    pub(super) fn occlude(&self, work: &mut Workspace<S>, glass: bool, mut lit: impl FnMut(usize, DVec3)) {
+    /// Calls `lit` with the number of each of `rays` that is not occluded, and the share of its light that arrives; `glass`
+    /// lets light pass through it.
+    pub(super) fn occlude(
+        &self,
+        rays: &Rays<S>,
+        work: &mut Workspace<S>,
+        glass: bool,
+        mut lit: impl FnMut(usize, DVec3),
+    ) {
         let clock = Instant::now();
         let counters = self.settings.count.then_some(&mut work.counters);
         let (hits, occluded, scratch) = (&mut work.hits, &mut work.occluded, &mut work.scratch);
-        let left = self.through().shadows(&work.batch, hits, occluded, scratch, &mut work.again, glass, counters);
+        let left = self.through().shadows(rays, hits, occluded, scratch, &mut work.again, glass, counters);
         work.clock.shadowing += clock.elapsed();
         left.iter().enumerate().filter(|(_, left)| **left != DVec3::ZERO).for_each(|(i, left)| lit(i, *left));
     }
@@ -306,34 +298,15 @@ impl<'a, S: Real> Shader<'a, S> {
         }
     }
 
-    /// The surface point that ray `i` hit.
-    pub(super) fn vertex(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize, path: u32, throughput: DVec3) -> Vertex {
-        let org = DVec3::from(rays.org(i).map(S::to_f64));
-        let dir = DVec3::from(rays.dir(i).map(S::to_f64));
+    /// What pictures show of the first hit of ray `i`, besides radiance.
+    fn show(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize, seen: &mut Sample) {
+        let [org, dir] = [rays.org(i), rays.dir(i)].map(|v| DVec3::from(v.map(S::to_f64)));
         let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
         let surface = self.world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);
-        let facing = if surface.ng.dot(dir) > 0.0 { -surface.ng } else { surface.ng };
-        // A triangle too thin for a normal is seen face on.
-        let normal = if facing.is_finite() { facing } else { -dir.normalize_or_zero() };
-        let ns = self.looks.bumped(surface.material, &surface);
-        let shading_normal = if surface.ng.dot(dir) > 0.0 { -ns } else { ns };
-        let shading_normal = if surface.ng == normal || surface.ng == -normal { shading_normal } else { normal };
-        let error = position_error::<S>(org, dir, t, surface.position, surface.magnitude);
-        let (position, material) = (surface.position, surface.material);
-        let classic = Classic::of(&self.looks, &surface, dir);
-        let ambient = self.looks.ambient(material, &surface);
-        Vertex { path, position, error, normal, shading_normal, dir, material, classic, ambient, throughput }
-    }
-}
-
-impl Vertex {
-    /// Origin of a ray that leaves the point to the side of its normal.
-    pub fn leave<S: Real>(&self) -> [S; 3] {
-        offset_origin(self.position, self.error, self.normal)
-    }
-
-    /// Origin of a ray that enters the surface.
-    pub fn enter<S: Real>(&self) -> [S; 3] {
-        offset_origin(self.position, self.error, -self.normal)
+        seen.distance = t * dir.length();
+        seen.position = surface.position;
+        [seen.normal, seen.shading_normal] = self.turned(&surface, dir);
+        seen.albedo = Classic::of(&self.looks, &surface, dir).base;
+        (seen.inst, seen.prim, seen.material) = (hits.inst[i], hits.prim[i], surface.material);
     }
 }

@@ -1,29 +1,46 @@
-//! Recursive ray tracing without recursion: one batch per level and light.
+//! Recursive ray tracing without recursion: one batch per level and light, shaded in lanes.
 
-use std::f64::consts::PI;
+use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use super::classic::refract;
-use super::lights::{irradiance, shadow_segment};
+use super::branches::Branches;
+use super::classic::refracted;
+use super::lights::Lamp;
 use super::sample::Sample;
-use super::shader::{Shader, Vertex, Workspace};
-use crate::lanes::Real;
+use super::shader::{Shader, Workspace};
+use super::vertices::{
+    AMBIENT, DIFFUSE, EMISSION, ETA, MIRROR, NORMAL, POSITION, SHADING, THROUGH, Vertices, lanes_of,
+};
+use crate::lanes::space::{add, choose, scale, times};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each};
 use crate::ray::Rays;
 use crate::scene::description::Light;
 
 /// Branches whose light would be weakened below this are not followed.
 const CUT_OFF: f64 = 1.0 / 1024.0;
 
-/// A ray that leaves a vertex: org, direction, what of its radiance reaches the eye.
-type Branch<'v, S> = (&'v Vertex, [S; 3], DVec3, DVec3);
+/// One thread's arrays, reused from level to level.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory<S> {
+    now: Branches<S>,
+    next: Branches<S>,
+    shadows: Branches<S>,
+}
+
+/// A level: its rays, what they carry, and where they arrived.
+struct Level<'m, S> {
+    rays: &'m Rays<S>,
+    carried: &'m Branches<S>,
+    vertices: &'m Vertices<S>,
+}
 
 impl<S: Real> Shader<'_, S> {
     /// Radiance = emission + diffuse ambient + sum over lights of diffuse / pi * irradiance + mirror * radiance from
     /// the mirrored direction + through * radiance from the refracted direction, `depth` levels deep; what leaves the
     /// scene sees the background. Light passes glass straight on its way from a light.
     ///
-    /// `work.vertices` are the hits of `rays`. A sample's terms are added level by level and light by light.
+    /// `work.hits` are the hits of `rays`. A sample's terms are added level by level and light by light.
     pub(super) fn whitted(
         &self,
         rays: &Rays<S>,
@@ -40,115 +57,159 @@ impl<S: Real> Shader<'_, S> {
                 out[i].alpha = f64::from(u8::from(behind != DVec3::ZERO));
             }
         }
+        let mut memory = std::mem::take(&mut work.whitted);
+        let Memory { now, next, shadows } = &mut memory;
         let mut vertices = std::mem::take(&mut work.vertices);
-        let mut next = Vec::new();
+        now.start(rays.len());
         for level in 0..=self.settings.depth {
-            for vertex in &vertices {
-                let point = &vertex.classic;
-                let unlit = point.emission + point.diffuse * self.ambient * vertex.ambient;
-                out[vertex.path as usize].radiance += vertex.throughput * unlit;
-            }
+            let level_rays = if level == 0 { rays } else { &now.rays };
+            self.meet(level_rays, &work.hits, &mut vertices);
+            let here = Level { rays: level_rays, carried: now, vertices: &vertices };
+            self.add_unlit(&here, out);
             for light in &self.lights {
-                self.add_light(light, &vertices, work, out);
+                self.add_light(light, &here, shadows, work, out);
             }
-            if level == self.settings.depth || vertices.is_empty() {
-                work.lap(level);
+            if level < self.settings.depth {
+                branch(&here, next, work);
+            } else {
+                next.open(0);
+            }
+            work.lap(level);
+            std::mem::swap(now, next);
+            if now.len() == 0 {
                 break;
             }
-            next.clear();
-            let branches = self.branches(&vertices);
-            work.lap(level);
-            self.follow(&branches, pixels, (sample, level + 1), &mut next, work, out);
-            std::mem::swap(&mut vertices, &mut next);
+            self.intersect(&now.rays, work, |i, layer| {
+                self.number(pixels[now.path[i] as usize], sample, level + 1, layer)
+            });
+            for i in (0..now.len()).filter(|i| !work.hits.is_hit(*i)) {
+                let behind = self.beyond(DVec3::from(now.rays.dir(i).map(S::to_f64)));
+                out[now.path[i] as usize].radiance += now.weight_of(i) * behind;
+            }
         }
-        work.vertices = vertices;
+        (work.whitted, work.vertices) = (memory, vertices);
     }
 
-    /// Adds what `light` contributes to each vertex, one compact batch of shadow rays for those that face it.
-    fn add_light(&self, light: &Light, vertices: &[Vertex], work: &mut Workspace<S>, out: &mut [Sample]) {
-        let lit: Vec<(&Vertex, DVec3)> = vertices
-            .iter()
-            .filter_map(|vertex| {
-                let arriving = irradiance(light, vertex.position, vertex.shading_normal)?;
-                let value = vertex.throughput * vertex.classic.diffuse / PI * arriving;
-                (value != DVec3::ZERO).then_some((vertex, value))
-            })
-            .collect();
-        if !self.shadows {
-            lit.iter().for_each(|(vertex, value)| out[vertex.path as usize].radiance += *value);
-            return;
+    /// Adds what points show without any light's help.
+    fn add_unlit(&self, level: &Level<'_, S>, out: &mut [Sample]) {
+        let Level { carried, vertices, .. } = level;
+        let ambient = self.ambient.to_array().map(S::Wide::constant);
+        for (first, lanes) in vertices.packets() {
+            let shining = vertices.shining[first / S::Wide::N];
+            let lanes = if self.ambient == DVec3::ZERO { shining } else { lanes };
+            if lanes == 0 {
+                continue;
+            }
+            let reflected = times(vertices.vector(DIFFUSE, first), scale(ambient, vertices.scalar(AMBIENT, first)));
+            let shines = <S::Wide as Lanes>::Mask::from_bits(shining);
+            let nothing = [S::Wide::constant(0.0); 3];
+            let emitted = choose(shines, vertices.vector(EMISSION, first), nothing);
+            let value = times(carried.weight(first), add(emitted, reflected));
+            let columns = spill::<S>(value);
+            for lane in lanes_of(lanes) {
+                out[carried.path[first + lane] as usize].radiance += at(&columns, lane);
+            }
         }
-        if lit.is_empty() {
-            return;
-        }
-        work.batch.reset(lit.len());
-        for (i, (vertex, _)) in lit.iter().enumerate() {
-            let org: [S; 3] = vertex.leave();
-            let (dir, t_max) = shadow_segment::<S>(light, DVec3::from(org.map(S::to_f64)));
-            work.batch.set(i, org, dir.to_array().map(S::from_f64), S::from_f64(0.0), S::from_f64(t_max));
-        }
-        work.rays.shadow += work.batch.live_count() as u64;
-        self.occlude(work, true, |i, left| {
-            let (vertex, value) = lit[i];
-            out[vertex.path as usize].radiance += value * left;
-        });
     }
 
-    /// The mirrored and refracted rays of `vertices` that carry enough light, all mirrored ones first.
-    fn branches<'v>(&self, vertices: &'v [Vertex]) -> Vec<Branch<'v, S>> {
-        let bright = |light: DVec3| light.max_element() >= CUT_OFF;
-        let mirrored = vertices.iter().filter_map(|vertex| {
-            let throughput = vertex.throughput * vertex.classic.mirror;
-            let dir = reflect(vertex.dir, vertex.shading_normal);
-            // Where the shading normal would send it into the surface, the surface's own normal decides.
-            let dir = if dir.dot(vertex.normal) > 0.0 { dir } else { reflect(vertex.dir, vertex.normal) };
-            bright(throughput).then(|| (vertex, vertex.leave(), dir, throughput))
-        });
-        let refracted = vertices.iter().filter_map(|vertex| {
-            let throughput = vertex.throughput * vertex.classic.through;
-            let dir = refract(vertex.dir, vertex.normal, vertex.classic.eta)?;
-            bright(throughput).then(|| (vertex, vertex.enter(), dir, throughput))
-        });
-        mirrored.chain(refracted).collect()
-    }
-
-    /// Follows `branches`: their hits into `next`, the background where there is none.
-    fn follow(
+    /// Adds what `light` contributes, one compact batch of shadow rays for the points that face it.
+    fn add_light(
         &self,
-        branches: &[Branch<'_, S>],
-        pixels: &[(u32, u32)],
-        (sample, level): (u32, u32),
-        next: &mut Vec<Vertex>,
+        light: &Light,
+        level: &Level<'_, S>,
+        shadows: &mut Branches<S>,
         work: &mut Workspace<S>,
         out: &mut [Sample],
     ) {
-        if branches.is_empty() {
-            return;
-        }
-        let mut batch = std::mem::take(&mut work.batch);
-        batch.reset(branches.len());
-        for (i, &(vertex, org, dir, _)) in branches.iter().enumerate() {
-            batch.set(i, org, dir.to_array().map(S::from_f64), S::from_f64(0.0), S::from_f64(f64::INFINITY));
-            // Of a vertex's two branches the mirrored one counts as such.
-            let is_mirrored = dir.dot(vertex.normal) > 0.0;
-            *(if is_mirrored { &mut work.rays.mirror } else { &mut work.rays.refracted }) +=
-                u64::from(batch.is_live(i));
-        }
-        self.intersect(&batch, work, |i, layer| self.number(pixels[branches[i].0.path as usize], sample, level, layer));
-        for (i, &(vertex, _, dir, throughput)) in branches.iter().enumerate() {
-            if work.hits.is_hit(i) {
-                next.push(self.vertex(&batch, &work.hits, i, vertex.path, throughput));
+        let Level { rays, carried, vertices } = level;
+        let lamp = Lamp::<S::Wide>::new(light);
+        let zero = S::Wide::constant(0.0);
+        shadows.open(if self.shadows { rays.len() } else { 0 });
+        for (first, lanes) in vertices.packets() {
+            let (arriving, faces) = lamp.irradiance(vertices.vector(POSITION, first), vertices.vector(SHADING, first));
+            let diffuse = scale(vertices.vector(DIFFUSE, first), S::Wide::constant(FRAC_1_PI));
+            let value = times(times(carried.weight(first), diffuse), arriving);
+            let some = !(value[0].cmp_eq(zero) & value[1].cmp_eq(zero) & value[2].cmp_eq(zero));
+            let lit = (faces & some).bits() & lanes;
+            if lit == 0 {
+                continue;
+            }
+            let path = &carried.path[first..];
+            if self.shadows {
+                let org = vertices.leave(first);
+                let (dir, t_max) = lamp.segment(org);
+                shadows.push(lit, path, [org, dir, value], t_max);
             } else {
-                out[vertex.path as usize].radiance += throughput * self.beyond(dir);
+                let columns = spill::<S>(value);
+                lanes_of(lit).for_each(|lane| out[path[lane] as usize].radiance += at(&columns, lane));
             }
         }
-        work.batch = batch;
+        shadows.close();
+        if shadows.len() == 0 {
+            return;
+        }
+        work.rays.shadow += shadows.rays.live_count() as u64;
+        self.occlude(&shadows.rays, work, true, |i, left| {
+            out[shadows.path[i] as usize].radiance += shadows.weight_of(i) * left;
+        });
     }
 }
 
-/// Direction `dir` mirrored at a plane with unit normal `normal`; the length stays.
-fn reflect(dir: DVec3, normal: DVec3) -> DVec3 {
-    dir - 2.0 * dir.dot(normal) * normal
+/// The mirrored and refracted rays of `level` that carry enough light into `next`, all mirrored ones first.
+fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Workspace<S>) {
+    let Level { rays, carried, vertices } = level;
+    let bright = |light: Lanes3<S::Wide>| {
+        S::Wide::constant(CUT_OFF).cmp_le(light[0].fast_max(light[1]).fast_max(light[2])).bits()
+    };
+    let along = |first: usize| -> Lanes3<S::Wide> { each(|axis| S::Wide::load(&rays.dir[axis][first..])) };
+    next.open(2 * rays.len());
+    for (first, lanes) in vertices.packets() {
+        let throughput = times(carried.weight(first), vertices.vector(MIRROR, first));
+        let lanes = lanes & bright(throughput);
+        if lanes == 0 {
+            continue;
+        }
+        let (normal, dir) = (vertices.vector(NORMAL, first), along(first));
+        let mirrored = reflect(dir, vertices.vector(SHADING, first));
+        // Where the shading normal would send it into the surface, the surface's own normal decides.
+        let outward = S::Wide::constant(0.0).cmp_lt(dot(mirrored, normal));
+        let dir = choose(outward, mirrored, reflect(dir, normal));
+        next.push(lanes, &carried.path[first..], [vertices.leave(first), dir, throughput], S::INFINITY);
+    }
+    let count_mirrored = next.len();
+    for (first, lanes) in vertices.packets() {
+        let throughput = times(carried.weight(first), vertices.vector(THROUGH, first));
+        let lanes = lanes & bright(throughput);
+        if lanes == 0 {
+            continue;
+        }
+        let (dir, goes_on) = refracted(along(first), vertices.vector(NORMAL, first), vertices.scalar(ETA, first));
+        let lanes = lanes & goes_on.bits();
+        next.push(lanes, &carried.path[first..], [vertices.enter(first), dir, throughput], S::INFINITY);
+    }
+    next.close();
+    let count = |i: &usize| next.rays.is_live(*i);
+    work.rays.mirror += (0..count_mirrored).filter(count).count() as u64;
+    work.rays.refracted += (count_mirrored..next.len()).filter(count).count() as u64;
+}
+
+/// Directions `dir` mirrored at planes with unit normals `normal`; the length stays.
+#[inline(always)]
+fn reflect<V: Lanes>(dir: Lanes3<V>, normal: Lanes3<V>) -> Lanes3<V> {
+    let along = V::constant(-2.0) * dot(dir, normal);
+    each(|i| normal[i].mul_add(along, dir[i]))
+}
+
+#[inline(always)]
+fn spill<S: Real>(vector: Lanes3<S::Wide>) -> [[S; MAX_LANES]; 3] {
+    let mut columns = [[S::ZERO; MAX_LANES]; 3];
+    columns.iter_mut().zip(vector).for_each(|(column, x)| x.store(column));
+    columns
+}
+
+#[inline(always)]
+fn at<S: Real>(columns: &[[S; MAX_LANES]; 3], lane: usize) -> DVec3 {
+    DVec3::from(each(|axis| columns[axis][lane].to_f64()))
 }
 
 #[cfg(test)]
@@ -157,9 +218,10 @@ mod tests {
 
     #[test]
     fn mirrors_turn_the_normal_part_only() {
-        let d = reflect(DVec3::new(3.0, -4.0, 1.0), DVec3::Y);
-        assert_eq!(d, DVec3::new(3.0, 4.0, 1.0));
+        let d = reflect([3.0, -4.0, 1.0], [0.0, 1.0, 0.0]);
+        assert_eq!(d, [3.0, 4.0, 1.0]);
         let n = DVec3::new(1.0, 1.0, 0.0).normalize();
-        assert!((reflect(DVec3::new(-2.0, 0.0, 0.0), n) - DVec3::new(0.0, 2.0, 0.0)).length() < 1e-15);
+        let d = DVec3::from(reflect([-2.0, 0.0, 0.0], n.to_array()));
+        assert!((d - DVec3::new(0.0, 2.0, 0.0)).length() < 1e-15);
     }
 }

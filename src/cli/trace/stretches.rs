@@ -45,7 +45,7 @@ pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<
     let scalar = args.engine.find::<S>()?.lanes() == 1;
     let workers = Workers::new(args.threads.count())?;
     let world = workers.install(|| World::<S>::compile(description, args.scene.options.build()))?;
-    let batches = split::<S>(rays);
+    let batches = split::<S>(rays, workers.threads());
     let pass = |scalar: bool| workers.install(|| all(&world, &batches, scalar));
     let found = pass(scalar);
     if !scalar && pass(true) != found {

@@ -23,7 +23,7 @@ fn splitting_keeps_every_ray_in_order() {
     for i in 0..rays.len() {
         rays.set(i, [i as f32, 0.5, -1.0], [0.1, 0.2, 0.3], 0.0, f32::INFINITY);
     }
-    let batches = split::<f64>(&rays);
+    let batches = split::<f64>(&rays, 1);
     assert_eq!(batches.iter().map(Rays::len).collect::<Vec<_>>(), [BATCH, BATCH, 7]);
     for i in 0..rays.len() {
         let (batch, slot) = (&batches[i / BATCH], i % BATCH);
@@ -31,7 +31,29 @@ fn splitting_keeps_every_ray_in_order() {
         assert_eq!(batch.dir(slot), [0.1f32, 0.2, 0.3].map(f64::from));
         assert_eq!((batch.t_min[slot], batch.t_max[slot]), (0.0, f64::INFINITY));
     }
-    assert_eq!(split::<f32>(&Rays::new(0)).len(), 0);
+    assert_eq!(split::<f32>(&Rays::new(0), 1).len(), 0);
+}
+
+#[test]
+fn calls_keep_every_ray_in_order_and_are_shared_fairly() {
+    let mut next = 0.0;
+    let mut batch = |len: usize| {
+        let mut rays = Rays::<f32>::new(len);
+        (0..len).for_each(|i| {
+            next += 1.0;
+            rays.set(i, [next, 0.0, 0.0], [0.0, 0.0, 1.0], 0.0, 1.0);
+        });
+        rays
+    };
+    let mut batches: Vec<_> = (0..200).map(|_| batch(BATCH)).collect();
+    batches.push(batch(5));
+    for (threads, most) in [(1, 4 * BATCH), (2, 3 * BATCH), (64, BATCH)] {
+        let calls = calls::<f32>(&batches, threads);
+        assert!(calls.iter().all(|rays| rays.len() <= most) && calls[0].len() == most, "{threads}");
+        let numbers: Vec<f32> = calls.iter().flat_map(|rays| rays.org[0][..rays.len()].to_vec()).collect();
+        assert_eq!(numbers, (1..=200 * BATCH + 5).map(|i| i as f32).collect::<Vec<_>>());
+    }
+    assert!(calls::<f32>(&[], 1).is_empty());
 }
 
 #[test]

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use crate::scene::mesh::Mesh;
 use crate::scene::solids;
+use crate::scene::solids::flat::closed;
 
 /// The mode of a bot that encloses something.
 const SOLID: u8 = 2;
@@ -15,32 +16,23 @@ const SOLID: u8 = 2;
 /// turned the same way, and every connected piece outwards (a piece inside another one, a void, is filled).
 ///
 /// # Errors
-/// In words: it is a surface or a plate; its triangles cannot be turned the same way. Whether it is closed is seen
-/// where the tree is lowered.
+/// In words: it is a surface or a plate; it is not closed; its triangles cannot be turned the same way.
 pub(super) fn solid(mode: u8, vertices: &[DVec3], faces: &[[u32; 3]]) -> Result<solids::Solid, String> {
     if mode != SOLID {
         return Err("a `bot` that is a surface or a plate is not supported, those of mode solid are".into());
     }
-    let (positions, mut triangles) = welded(vertices, faces);
-    turn(&positions, &mut triangles)?;
-    Ok(solids::Solid::Mesh(Arc::new(Mesh { positions, triangles, ..Mesh::default() })))
+    let mut triangles = welded(vertices, faces);
+    turn(vertices, &mut triangles)?;
+    let mesh = Mesh { positions: vertices.to_vec(), triangles, ..Mesh::default() };
+    closed(&mesh)?;
+    Ok(solids::Solid::Mesh(Arc::new(mesh)))
 }
 
 /// Corners at one place as one corner, without triangles that lose their area by that.
-fn welded(vertices: &[DVec3], faces: &[[u32; 3]]) -> (Vec<DVec3>, Vec<[u32; 3]>) {
-    let (mut positions, mut at) = (Vec::new(), HashMap::new());
-    let number: Vec<u32> = vertices
-        .iter()
-        .map(|&p| {
-            // Zeros of both signs are one place.
-            *at.entry((p + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert_with(|| {
-                positions.push(p);
-                positions.len() as u32 - 1
-            })
-        })
-        .collect();
-    let corners = faces.iter().map(|face| face.map(|i| number[i as usize]));
-    (positions, corners.filter(|[a, b, c]| a != b && b != c && c != a).collect())
+fn welded(vertices: &[DVec3], faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let first = Mesh::first_at_place(vertices);
+    let corners = faces.iter().map(|face| face.map(|i| first[i as usize]));
+    corners.filter(|[a, b, c]| a != b && b != c && c != a).collect()
 }
 
 /// Turns the triangles of each connected piece the same way, outwards.
@@ -116,14 +108,6 @@ mod tests {
         [0.0, 1.0].iter().flat_map(|&z| square.map(|(x, y)| DVec3::new(x + at, y, z))).collect()
     }
 
-    fn volume(positions: &[DVec3], triangles: &[[u32; 3]]) -> f64 {
-        let one = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|k| positions[k as usize]);
-            a.dot(b.cross(c)) / 6.0
-        };
-        triangles.iter().map(one).sum()
-    }
-
     #[test]
     fn any_order_of_corners_gives_two_cubes_turned_outwards() {
         for flips in 0..1u32 << 12 {
@@ -136,17 +120,19 @@ mod tests {
                     faces.push(if turned >> i & 1 == 0 { [at, at + 1, at + 2] } else { [at, at + 2, at + 1] });
                 }
             }
-            let (positions, mut triangles) = welded(&vertices, &faces);
-            assert_eq!(positions.len(), 16);
-            turn(&positions, &mut triangles).unwrap();
-            assert!((volume(&positions, &triangles[..12]) - 1.0).abs() < 1e-12, "{flips:b}");
-            assert!((volume(&positions, &triangles[12..]) - 1.0).abs() < 1e-12, "{flips:b}");
+            let mut triangles = welded(&vertices, &faces);
+            turn(&vertices, &mut triangles).unwrap();
+            for cube in triangles.chunks(12) {
+                let mesh = Mesh { positions: vertices.clone(), triangles: cube.to_vec(), ..Mesh::default() };
+                assert!((mesh.volume() - 1.0).abs() < 1e-12, "{flips:b}");
+            }
         }
     }
 
     #[test]
-    fn surfaces_and_one_sided_bands_are_refused() {
+    fn surfaces_holes_and_one_sided_bands_are_refused() {
         assert!(solid(1, &corners(0.0), &CUBE).unwrap_err().contains("surface"));
+        assert!(solid(2, &corners(0.0), &CUBE[1..]).unwrap_err().contains("not closed"));
         // A band of five triangles with half a turn.
         let band = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 0], [4, 0, 1]];
         let places: Vec<DVec3> = (0..5).map(|i| DVec3::new(f64::from(i), f64::from(i * i), f64::from(i % 2))).collect();

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
 use super::{NodeId, NodeKind, Solid, SolidTree};
 use crate::scene::description::{MaterialId, Shape};
@@ -202,14 +202,11 @@ fn check(solid: &Solid) -> Result<(), String> {
 
 /// Refuses a mesh that has a border: every edge must be gone along as often one way as the other. Corners at one place are
 /// one corner, whatever their numbers.
-fn closed(mesh: &Mesh) -> Result<(), String> {
+pub(in crate::scene) fn closed(mesh: &Mesh) -> Result<(), String> {
     if mesh.triangles.is_empty() || !mesh.positions.iter().all(|p| p.is_finite()) {
         return Err("a mesh without triangles or with corners that are not finite has no inside".into());
     }
-    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
-    let place = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
-    let corner: Vec<u32> =
-        mesh.positions.iter().zip(0..).map(|(p, i)| *first_at.entry(place(*p)).or_insert(i)).collect();
+    let corner = Mesh::first_at_place(&mesh.positions);
     let mut balance: HashMap<(u32, u32), i64> = HashMap::new();
     for triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|i| corner[i as usize]);
@@ -238,6 +235,8 @@ pub fn flatten(tree: &SolidTree) -> Result<Arc<FlatTree>, String> {
 #[cfg(test)]
 mod tests {
     use super::super::{SolidNode, ball};
+    use glam::DVec3;
+
     use super::*;
 
     fn unit_ball(tree: &mut SolidTree) -> NodeId {

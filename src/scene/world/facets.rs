@@ -6,7 +6,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::runs::{Run, Runs};
 use super::surface::{leaf_magnitude, shape_magnitude};
 use super::{World, solids};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, map3, space};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3, space};
 use crate::math::NormalMap;
 use crate::ray::{Hits, INVALID_ID, Rays};
 use crate::scene::assembly::{AssemblyObject, PartKind};
@@ -54,6 +54,16 @@ impl<S: Real> Facet<S> {
         (0..3).for_each(|axis| fields[12 + axis] = S::from_f64(normal[axis]));
         Self { fields }
     }
+}
+
+/// `f` of each field; written out, because `map` over so many becomes calls that pass all through memory.
+#[inline(always)]
+fn vectors<V: Lanes>(f: impl Fn(usize) -> V) -> [V; FIELDS] {
+    let mut fields = [V::constant(0.0); FIELDS];
+    for (k, field) in fields.iter_mut().enumerate() {
+        *field = f(k);
+    }
+    fields
 }
 
 /// The facets of one object's shapes and leaves.
@@ -169,7 +179,7 @@ impl<S: Real> World<S> {
         let fields: [S::Wide; FIELDS] = match facet {
             Some(facet) if is_same => {
                 (met.part, met.material) = ([run.part; MAX_LANES], [run.material; MAX_LANES]);
-                facet.fields.map(S::Wide::splat)
+                vectors(|k| S::Wide::splat(facet.fields[k]))
             }
             None if is_same && !ALL => {
                 met.hit = 0;
@@ -177,9 +187,9 @@ impl<S: Real> World<S> {
             }
             _ => self.gather::<ALL>(rays, hits, first, &mut met),
         };
-        let vector = |from: &[Vec<S>; 3]| [&from[0], &from[1], &from[2]].map(|a| S::Wide::load(&a[first..]));
+        let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
         let (org, dir, t) = (vector(&rays.org), vector(&rays.dir), S::Wide::load(&hits.t[first..]));
-        met.position = [0, 1, 2].map(|axis| dir[axis].mul_add(t, org[axis]));
+        met.position = each(|axis| dir[axis].mul_add(t, org[axis]));
         let row = |k: usize| [fields[3 * k], fields[3 * k + 1], fields[3 * k + 2]];
         let [x, y, z, centre, constant, magnitude] = [row(0), row(1), row(2), row(3), row(4), row(5)];
         let from = space::sub(met.position, centre);
@@ -222,7 +232,7 @@ impl<S: Real> World<S> {
             };
             columns.iter_mut().zip(&facet.fields).for_each(|(column, &x)| column[lane] = x);
         }
-        columns.map(|column| S::Wide::load(&column))
+        vectors(|k| S::Wide::load(&columns[k]))
     }
 
     /// Run and facet of hit `i`.
@@ -236,11 +246,15 @@ impl<S: Real> World<S> {
     }
 
     /// The plane through hit `i`, before its normal is turned.
-    #[cold]
+    #[inline(never)]
     fn plain(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize) -> Facet<S> {
         let (org, dir) = (DVec3::from(rays.org(i).map(S::to_f64)), DVec3::from(rays.dir(i).map(S::to_f64)));
         let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
-        let normal = self.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]).ng;
+        let (prim, inst) = (hits.prim[i], hits.inst[i]);
+        if let Some(outward) = self.outward(org + dir * t, u as u32, prim, inst) {
+            return Facet::flat(outward);
+        }
+        let normal = self.surface(org, dir, t, u, v, prim, inst).ng;
         Facet::flat(if v > 0.5 { -normal } else { normal })
     }
 }

@@ -102,8 +102,8 @@ impl Runs {
     }
 }
 
-/// The place of the only shape of `run`.
-fn place(object: &AssemblyObject, run: &Run) -> Option<Place> {
+/// The place of the only shape of `run` in the object's space; `None` of triangles.
+pub fn place(object: &AssemblyObject, run: &Run) -> Option<Place> {
     let part = &object.parts[run.part as usize];
     match &part.kind {
         PartKind::Mesh(_) => None,

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::runs::Place;
+use super::runs::{self, Place};
 use super::{World, solids};
 use crate::lanes::Real;
 use crate::math::normal_to_world;
@@ -100,21 +100,29 @@ impl<S: Real> World<S> {
         }
     }
 
+    /// Unit outward normal of the shape or leaf `prim` of instance `inst`, which stays where its object is, at `position` on
+    /// its face `face`; `None` of other instances and of triangles.
+    pub(super) fn outward(&self, position: DVec3, face: u32, prim: u32, inst: u32) -> Option<DVec3> {
+        let object =
+            self.instances[inst as usize].identity.then_some(self.assembly.placements[inst as usize].object)?;
+        let (run, kept) = self.runs[object as usize].placed(prim);
+        let (part, place) = (&self.assembly.objects[object as usize].parts[run.part as usize], kept?);
+        let local = place.local(position);
+        match &part.kind {
+            PartKind::Mesh(_) => None,
+            PartKind::Shape(shape) => Some(place.normal(solids::shape_normal(shape, local, face))),
+            PartKind::Solids(tree) => {
+                let leaf = &tree.leaves[(prim - part.first_prim) as usize];
+                Some(place.normal(solids::solid_normal(&leaf.solid, local, face)))
+            }
+        }
+    }
+
     /// `point`, in the space of `object`, in that of its shape or leaf `prim`; as it is for triangles.
     pub fn local(&self, object: u32, prim: u32, point: DVec3) -> DVec3 {
         let (run, kept) = self.runs[object as usize].placed(prim);
-        if let Some(place) = kept {
-            return place.local(point);
-        }
-        let part = &self.assembly.objects[object as usize].parts[run.part as usize];
-        match &part.kind {
-            PartKind::Mesh(_) => point,
-            PartKind::Shape(_) => Place::new(&part.to_object).local(point),
-            PartKind::Solids(tree) => {
-                let leaf = &tree.leaves[(prim - part.first_prim) as usize];
-                Place::new(&(part.to_object * leaf.to_tree)).local(point)
-            }
-        }
+        let place = kept.copied().or_else(|| runs::place(&self.assembly.objects[object as usize], &run));
+        place.map_or(point, |place| place.local(point))
     }
 
     /// Material of primitive `prim` of `object`: an index into the description's materials.

@@ -277,7 +277,13 @@ fn aim_at_light(light: &Light, from: DVec3, place: [f64; 2]) -> Option<Aim> {
         Light::Point { position, intensity } | Light::Spot { position, intensity, .. } => {
             let away = position - from;
             let dir = away.try_normalize()?;
-            let radiance = intensity * (spot_share(light, -away) / away.length_squared());
+            let share = match *light {
+                Light::Spot { direction, inner, outer, .. } => {
+                    spot_share(-dir.dot(direction.normalize_or_zero()), [inner.cos(), outer.cos()])
+                }
+                _ => 1.0,
+            };
+            let radiance = intensity * (share / away.length_squared());
             radiance.is_finite().then_some(Aim {
                 target: position,
                 is_far: false,

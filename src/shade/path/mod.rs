@@ -12,7 +12,6 @@
 //! picture does not depend on what else is in a wave.
 
 mod alias;
-mod bare;
 mod bsdf;
 mod emitter;
 mod lights;
@@ -20,7 +19,7 @@ mod points;
 mod scatter;
 mod shapes;
 mod sky;
-mod wave;
+pub(super) mod wave;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -29,7 +28,6 @@ use glam::DVec3;
 
 pub(super) use self::bsdf::fresnel;
 
-use self::bare::BareTriangles;
 use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
 };
@@ -38,6 +36,7 @@ use self::points::{BASE, FIELDS, NORMAL, OFFSET, OUT, PARAM, POSITION, Points, S
 use self::scatter::Chances;
 use self::shapes::ShapePoints;
 use self::wave::{Shadows, Wave};
+use super::bare::BareTriangles;
 use super::look::{Look, Looks, Model};
 use super::offset::position_error;
 use super::sample::Sample;

@@ -1,7 +1,8 @@
 //! Points on surfaces in packets, one list per model of scattering, so that a packet has one model.
 
-use crate::lanes::space::{choose, cross, normalize};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot};
+use crate::lanes::space::normalize;
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, map3};
+use crate::shade::place::Place;
 
 /// First field of the position, world space.
 pub const POSITION: usize = 0;
@@ -32,11 +33,6 @@ pub const RAW_TRIANGLE: usize = POSITION;
 pub const RAW_DIR: usize = OUT;
 /// Weights of the second and third corner, parameter of the hit.
 pub const RAW_PLACE: usize = PARAM + 4;
-
-/// Roundings of a raw point's triangle (see [`super::super::offset`]), with those of its weights.
-const TRIANGLE_ROUNDINGS: f64 = 14.0;
-/// Roundings of the ray, whose origin counts as position and distance.
-const RAY_ROUNDINGS: f64 = 16.0;
 
 /// One point's fields.
 pub type Fields<S> = [S; FIELDS];
@@ -115,32 +111,8 @@ fn settle<S: Real>(block: &mut Block<S>, first: usize) {
     let raw = <S::Wide as Lanes>::Mask::from_bits(block.raw >> first);
     let (corner, e1, e2) = (vector(RAW_TRIANGLE), vector(RAW_TRIANGLE + 3), vector(RAW_TRIANGLE + 6));
     let ([u, v, t], dir) = (vector(RAW_PLACE), vector(RAW_DIR));
-    let length = dot(dir, dir).sqrt();
-    let back = S::Wide::constant(-1.0) / length;
-    let (out, distance) = (dir.map(|x| x * back), t * length);
-    let position: Lanes3<S::Wide> = [0, 1, 2].map(|i| v.mul_add(e2[i], u.mul_add(e1[i], corner[i])));
-    // Edges of length about one: products of very small or large ones would leave the range of numbers.
-    let size = |e: Lanes3<S::Wide>| e[0].abs() + e[1].abs() + e[2].abs();
-    let unit = |e: Lanes3<S::Wide>| {
-        let rcp = S::Wide::constant(1.0) / size(e);
-        e.map(|x| x * rcp)
-    };
-    let normal = normalize(cross(unit(e1), unit(e2)));
-    let zero = S::Wide::constant(0.0);
-    let behind = dot(normal, out).cmp_lt(zero);
-    let normal = choose(behind, normal.map(|x| -x), normal);
-    let gamma = |roundings: f64| {
-        let n = roundings * S::EPSILON.to_f64();
-        S::Wide::constant(n / (1.0 - n))
-    };
-    // The origin is no further off than the position and the distance together; two more for the position's own.
-    let (of_ray, of_triangle) = (gamma(2.0 * RAY_ROUNDINGS + 2.0), gamma(TRIANGLE_ROUNDINGS));
-    let offset = [0, 1, 2].map(|i| {
-        let size = corner[i].abs() + e1[i].abs() + e2[i].abs();
-        let reach = position[i].abs() + (out[i] * distance).abs();
-        normal[i].abs() * of_ray.mul_add(reach, of_triangle * size)
-    });
-    let offset = offset[0] + offset[1] + offset[2];
+    let out = normalize(map3(dir, |x| -x));
+    let Place { position, normal, offset, .. } = Place::on_triangle([corner, e1, e2], [u, v, t], dir);
     let mut put = |field: usize, value: S::Wide| {
         let column = &mut block.fields[field][first..];
         S::Wide::select(raw, value, S::Wide::load(column)).store(column);

@@ -2,12 +2,12 @@
 
 use super::points::{BASE, FIELDS, Fields, NORMAL, OFFSET, OUT, PARAM, POSITION, SHADING, SQUEEZE, THROUGHPUT};
 use super::wave::Wave;
-use crate::lanes::space::{choose, normalize, scale};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot};
+use crate::lanes::space::normalize;
+use crate::lanes::{Lanes, Lanes3, Real, map3};
 use crate::ray::{Hits, Rays};
 use crate::scene::world::World;
 use crate::shade::look::Look;
-use crate::shade::offset::{PRIMITIVE_ROUNDINGS, RAY_ROUNDINGS};
+use crate::shade::place::Place;
 
 /// Rows of [`ShapePoints`]: position, normal, direction out, offset.
 const ROWS: usize = 10;
@@ -32,12 +32,6 @@ impl<S: Real> ShapePoints<S> {
         let padded = rays.padded_len();
         self.rows.iter_mut().for_each(|row| row.resize(padded, S::ZERO));
         self.material.resize(padded, 0);
-        let gamma = |roundings: f64| {
-            let n = roundings * S::EPSILON.to_f64();
-            S::Wide::constant(n / (1.0 - n))
-        };
-        // One more for the position's own rounding.
-        let (of_ray, of_shape) = (gamma(RAY_ROUNDINGS + 1.0), gamma(PRIMITIVE_ROUNDINGS));
         for first in (0..padded).step_by(S::Wide::N) {
             let met = world.met_facets(rays, hits, first);
             self.known.push(met.hit);
@@ -48,15 +42,10 @@ impl<S: Real> ShapePoints<S> {
             let vector = |from: &[Vec<S>; 3]| [&from[0], &from[1], &from[2]].map(|a| S::Wide::load(&a[first..]));
             let (org, dir): (Lanes3<S::Wide>, Lanes3<S::Wide>) = (vector(&rays.org), vector(&rays.dir));
             let t = S::Wide::load(&hits.t[first..]);
-            let behind = S::Wide::constant(0.0).cmp_lt(dot(met.normal, dir));
-            self.front.push(!behind.bits());
-            let normal = choose(behind, met.normal.map(|x| -x), met.normal);
-            let out = normalize(scale(dir, S::Wide::constant(-1.0)));
-            let offset = [0, 1, 2].map(|axis| {
-                let reach = met.position[axis].abs() + org[axis].abs() + (dir[axis] * t).abs();
-                normal[axis].abs() * of_ray.mul_add(reach, of_shape * met.magnitude[axis])
-            });
-            let rows = met.position.into_iter().chain(normal).chain(out).chain([offset[0] + offset[1] + offset[2]]);
+            let Place { position, normal, offset, front } = Place::on_facet(&met, org, dir, t);
+            self.front.push(front);
+            let out = normalize(map3(dir, |x| -x));
+            let rows = position.into_iter().chain(normal).chain(out).chain([offset]);
             self.rows.iter_mut().zip(rows).for_each(|(row, x)| x.store(&mut row[first..]));
             self.material[first..][..S::Wide::N].copy_from_slice(&met.material[..S::Wide::N]);
         }

@@ -3,9 +3,19 @@
 use glam::DVec3;
 
 use super::{Carry, Path, TOLERANCE};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, space};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, space};
 use crate::ray::{Hits, Rays};
 use crate::scene::world::World;
+
+/// Roundings of a point on a surface that a ray from there may still meet the surface within.
+const ROUNDINGS: f64 = 64.0;
+
+/// Where a ray from a point `org` on a surface begins to count: at the tolerance, which the digits of `f32` do not reach
+/// far from the origin.
+pub(super) fn start<S: Real>(org: [S; 3]) -> S {
+    let largest = org.iter().fold(S::ZERO, |most, x| most.fast_max(x.abs()));
+    S::from_f64(TOLERANCE).fast_max(largest * S::from_f64(ROUNDINGS * S::EPSILON.to_f64()))
+}
 
 /// Rays of paths.
 #[derive(Clone, Debug, Default)]
@@ -23,7 +33,7 @@ impl<S: Real> Level<S> {
         self.carry.clear();
         let tolerance = S::Wide::constant(TOLERANCE);
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
-            let vector = |from: &[Vec<S>; 3]| [0, 1, 2].map(|axis| S::Wide::load(&from[axis][first..]));
+            let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
             let dir: Lanes3<S::Wide> = space::normalize(vector(&rays.dir));
             for (axis, (org, dir)) in vector(&rays.org).into_iter().zip(dir).enumerate() {
                 org.store(&mut self.rays.org[axis][first..]);
@@ -38,10 +48,9 @@ impl<S: Real> Level<S> {
     pub fn open(&mut self, paths: &[Path]) {
         self.rays.reset(paths.len());
         self.carry.clear();
-        let (start, end) = (S::from_f64(TOLERANCE), S::INFINITY);
         for (i, path) in paths.iter().enumerate() {
             let (org, dir) = (path.org.to_array().map(S::from_f64), path.dir.to_array().map(S::from_f64));
-            self.rays.set(i, org, dir, start, end);
+            self.rays.set(i, org, dir, start(org), S::INFINITY);
             self.carry.push(path.carry);
         }
     }
@@ -99,7 +108,7 @@ impl<S: Real> Found<S> {
         for first in (0..padded).step_by(S::Wide::N) {
             let met = world.met(rays, hits, first);
             self.hit.push(met.hit);
-            let dir: Lanes3<S::Wide> = [0, 1, 2].map(|axis| S::Wide::load(&rays.dir[axis][first..]));
+            let dir: Lanes3<S::Wide> = each(|axis| S::Wide::load(&rays.dir[axis][first..]));
             let leaving = S::Wide::constant(0.0).cmp_lt(dot(met.normal, dir)).bits();
             self.leaving.push(leaving & met.hit);
             if met.hit == 0 {
@@ -126,11 +135,11 @@ impl<S: Real> Found<S> {
 
     /// Where ray `i` met something.
     pub fn position(&self, i: usize) -> DVec3 {
-        DVec3::from([0, 1, 2].map(|axis| self.position[axis][i].to_f64()))
+        DVec3::from(each(|axis| self.position[axis][i].to_f64()))
     }
 
     /// The outward normal there.
     pub fn normal(&self, i: usize) -> DVec3 {
-        DVec3::from([0, 1, 2].map(|axis| self.normal[axis][i].to_f64()))
+        DVec3::from(each(|axis| self.normal[axis][i].to_f64()))
     }
 }

@@ -8,7 +8,7 @@ use super::level::{Found, Level};
 use super::material::Finish;
 use super::shadow::Probes;
 use super::{AIR, AMBIENT, MAX_BOUNCES, Memory, Path, Rt, TOLERANCE, Within};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, space};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, space};
 use crate::shade::sample::Sample;
 use crate::shade::shader::{Shader, Workspace};
 
@@ -41,12 +41,12 @@ impl<S: Real> Meetings<S> {
         self.lanes[i / S::Wide::N] |= 1 << (i % S::Wide::N);
         (0..3).for_each(|axis| self.base[axis][i] = S::from_f64(base[axis]));
     }
+}
 
-    /// Vectors of lanes in which something is met: the first ray and the lanes.
-    fn packets(&self) -> impl Iterator<Item = (usize, u32)> {
-        let numbered = self.lanes.iter().enumerate().filter(|(_, lanes)| **lanes != 0);
-        numbered.map(|(k, &lanes)| (k * S::Wide::N, lanes))
-    }
+/// Vectors of lanes in which something is met: the first ray and the lanes.
+fn packets<S: Real>(lanes: &[u32]) -> impl Iterator<Item = (usize, u32)> {
+    let numbered = lanes.iter().enumerate().filter(|(_, lanes)| **lanes != 0);
+    numbered.map(|(k, &lanes)| (k * S::Wide::N, lanes))
 }
 
 #[inline(always)]
@@ -96,9 +96,7 @@ impl<S: Real> Shader<'_, S> {
         out: &mut [Sample],
     ) {
         let Memory { level, found, meetings, probes, next_probes, shadow, .. } = memory;
-        for (first, lanes) in meetings.packets().collect::<Vec<_>>() {
-            unlit(rt, level, found, meetings, first, lanes);
-        }
+        unlit(rt, level, found, meetings);
         for lamp in rt.lamps.iter().rev() {
             if lamp.region.is_none() {
                 meetings.visible.fill(S::ONE);
@@ -109,14 +107,14 @@ impl<S: Real> Shader<'_, S> {
             }
             light(rt, lamp, level, found, meetings);
         }
-        for (first, mut lanes) in meetings.packets() {
+        for (first, mut lanes) in packets::<S>(&meetings.lanes) {
             while lanes != 0 {
                 let i = first + lanes.trailing_zeros() as usize;
                 lanes &= lanes - 1;
-                let color = DVec3::from([0, 1, 2].map(|axis| meetings.color[axis][i].to_f64()));
+                let color = DVec3::from(each(|axis| meetings.color[axis][i].to_f64()));
                 let shown = match &rt.materials[found.region[i] as usize].finish {
                     Some(finish) if finish.reflect > 0.0 || finish.transmit > 0.0 => {
-                        let base = DVec3::from([0, 1, 2].map(|axis| meetings.base[axis][i].to_f64()));
+                        let base = DVec3::from(each(|axis| meetings.base[axis][i].to_f64()));
                         send_on(level.path(i), found, i, finish, base, color, next)
                     }
                     _ => color,
@@ -129,28 +127,29 @@ impl<S: Real> Shader<'_, S> {
 }
 
 /// What surfaces show without lights: ambient light, their own light, or a pattern as it is.
-fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>, first: usize, lanes: u32) {
-    let (normal, dir) = (vector(&found.normal, first), vector(&level.rays.dir, first));
-    let zero = S::Wide::constant(0.0);
-    let facing = zero - dot(normal, dir);
-    let ambient = zero.fast_max(facing) * S::Wide::constant(AMBIENT);
-    let Meetings { base, color, .. } = meetings;
-    for axis in 0..3 {
-        (S::Wide::load(&base[axis][first..]) * ambient).store(&mut color[axis][first..]);
-    }
-    let mut special = lanes;
-    while special != 0 {
-        let lane = special.trailing_zeros() as usize;
-        special &= special - 1;
-        let (i, region) = (first + lane, found.region[first + lane]);
-        let material = &rt.materials[region as usize];
-        if !material.is_light && material.finish.is_some() {
-            continue;
-        }
-        let lamp = rt.lamps.iter().find(|lamp| material.is_light && lamp.region == Some(region));
-        let seen = lamp.map(|lamp| lamp.seen(facing.lane(lane).to_f64(), found.normal(i)));
+fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
+    let Meetings { lanes, base, color, .. } = meetings;
+    for (first, mut lanes) in packets::<S>(lanes) {
+        let (normal, dir) = (vector(&found.normal, first), vector(&level.rays.dir, first));
+        let zero = S::Wide::constant(0.0);
+        let facing = zero - dot(normal, dir);
+        let ambient = zero.fast_max(facing) * S::Wide::constant(AMBIENT);
         for axis in 0..3 {
-            color[axis][i] = seen.map_or(base[axis][i], |seen| S::from_f64(seen[axis]));
+            (S::Wide::load(&base[axis][first..]) * ambient).store(&mut color[axis][first..]);
+        }
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let (i, region) = (first + lane, found.region[first + lane]);
+            let material = &rt.materials[region as usize];
+            if !material.is_light && material.finish.is_some() {
+                continue;
+            }
+            let lamp = rt.lamps.iter().find(|lamp| material.is_light && lamp.region == Some(region));
+            let seen = lamp.map(|lamp| lamp.seen(facing.lane(lane).to_f64(), found.normal(i)));
+            for axis in 0..3 {
+                color[axis][i] = seen.map_or(base[axis][i], |seen| S::from_f64(seen[axis]));
+            }
         }
     }
 }
@@ -173,7 +172,7 @@ fn towards<S: Real>(
 /// Shadow rays from the meetings to `lamp`.
 fn aim<S: Real>(rt: &Rt, lamp: &Lamp, found: &Found<S>, meetings: &Meetings<S>, probes: &mut Probes<S>) {
     probes.open(found.t.len());
-    for (first, lanes) in meetings.packets() {
+    for (first, lanes) in packets::<S>(&meetings.lanes) {
         let finishes = Finishes::of(rt, &found.region[first..], lanes);
         let (to_light, mut lit) = towards(lamp, found, &finishes, first);
         let (mut org, mut dir) = ([[S::ZERO; MAX_LANES]; 3], [[S::ZERO; MAX_LANES]; 3]);
@@ -196,8 +195,9 @@ fn aim<S: Real>(rt: &Rt, lamp: &Lamp, found: &Found<S>, meetings: &Meetings<S>, 
 /// Source of the highlight: Christophe Schlick, "A Fast Alternative to Phong's Specular Model", Graphics Gems IV, 1994.
 fn light<S: Real>(rt: &Rt, lamp: &Lamp, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
     let zero = S::Wide::constant(0.0);
-    for (first, lanes) in meetings.packets().collect::<Vec<_>>() {
-        let visible = S::Wide::load(&meetings.visible[first..]);
+    let Meetings { lanes, base, color, visible } = meetings;
+    for (first, lanes) in packets::<S>(lanes) {
+        let visible = S::Wide::load(&visible[first..]);
         let lanes = lanes & zero.cmp_lt(visible).bits();
         if lanes == 0 {
             continue;
@@ -216,8 +216,8 @@ fn light<S: Real>(rt: &Rt, lamp: &Lamp, level: &Level<S>, found: &Found<S>, meet
         let strength = visible * S::Wide::constant(lamp.fraction);
         for axis in 0..3 {
             let light = strength * S::Wide::constant(lamp.color[axis]);
-            let base = S::Wide::load(&meetings.base[axis][first..]);
-            let color = &mut meetings.color[axis][first..];
+            let base = S::Wide::load(&base[axis][first..]);
+            let color = &mut color[axis][first..];
             let before = S::Wide::load(color);
             let after = (base * diffuse + highlight).mul_add(light, before);
             S::Wide::select(lit, after, before).store(color);

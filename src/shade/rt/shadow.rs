@@ -1,6 +1,6 @@
 //! Whether lights are seen from surfaces: one ray to the middle of each, through whatever lets light pass.
 
-use super::level::Found;
+use super::level::{Found, start};
 use super::{Rt, TOLERANCE};
 use crate::lanes::Real;
 use crate::ray::Rays;
@@ -43,10 +43,11 @@ impl<S: Real> Probes<S> {
         self.carry.clear();
     }
 
-    /// Adds one from hit `slot`, towards the light at the unit direction `dir`.
+    /// Adds one from hit `slot`, towards the light at the unit direction `dir`; `org` is the tolerance away from the hit.
     #[inline]
     pub fn push(&mut self, slot: u32, org: [S; 3], dir: [S; 3]) {
-        self.add(Probe { slot, filter: 1.0, within: None }, org, dir, S::ZERO);
+        let from = start(org) - S::from_f64(TOLERANCE);
+        self.add(Probe { slot, filter: 1.0, within: None }, org, dir, from);
     }
 
     fn add(&mut self, probe: Probe, org: [S; 3], dir: [S; 3], from: S) {

@@ -1,4 +1,6 @@
-//! Triangles without shading normals whose look is the same everywhere: what a wave takes of them.
+//! Triangles without shading normals whose look is the same everywhere: what shading in lanes takes of them.
+
+use rayon::prelude::*;
 
 use crate::lanes::Real;
 use crate::scene::world::World;
@@ -19,7 +21,7 @@ pub struct Bare<S> {
 }
 
 /// Bare triangles by primitive number, where the world is one object of moderate size; others are worked out hit by hit.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct BareTriangles<S> {
     kept: Vec<Bare<S>>,
 }
@@ -32,7 +34,7 @@ impl<S: Real> BareTriangles<S> {
             return Self { kept: Vec::new() };
         }
         let other = Bare { numbers: [S::ZERO; 9], material: OTHER };
-        Self { kept: (0..count).map(|prim| of(world, looks, prim, 0).unwrap_or(other)).collect() }
+        Self { kept: (0..count).into_par_iter().map(|prim| of(world, looks, prim, 0).unwrap_or(other)).collect() }
     }
 
     /// Triangle `prim` of instance `inst`, if it is such a one.
@@ -49,7 +51,9 @@ impl<S: Real> BareTriangles<S> {
 #[inline]
 fn of<S: Real>(world: &World<S>, looks: &Looks<'_>, prim: u32, inst: u32) -> Option<Bare<S>> {
     let bare = world.bare_triangle(prim, inst);
-    looks.uniform(bare.material)?;
+    if !looks.is_alike(bare.material) {
+        return None;
+    }
     // Edges are differences in f64, rounded once.
     let [a, e1, e2] = bare.triangle?.map(|v| v.to_array().map(S::from_f64));
     let numbers = [a[0], a[1], a[2], e1[0], e1[1], e1[2], e2[0], e2[1], e2[2]];

@@ -1,0 +1,344 @@
+//! Points on surfaces that a level of rays has met, as structures of arrays parallel to the rays: where they are and what
+//! recursive ray tracing makes of their materials.
+
+use glam::DVec3;
+
+use super::classic::{Classic, Terms};
+use super::look::{Look, Model};
+use super::offset::position_error;
+use super::place::Place;
+use super::shader::Shader;
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3};
+use crate::ray::{Hits, INVALID_ID, Rays};
+use crate::scene::world::Surface;
+
+/// First field of the position, world space.
+pub(super) const POSITION: usize = 0;
+/// Unit geometric normal, on the side that the ray came from.
+pub(super) const NORMAL: usize = 3;
+/// Unit shading normal, on that side.
+pub(super) const SHADING: usize = 6;
+/// How far along the normal a ray must start.
+pub(super) const OFFSET: usize = 9;
+/// The terms of [`Classic`].
+pub(super) const DIFFUSE: usize = 10;
+pub(super) const MIRROR: usize = 13;
+pub(super) const THROUGH: usize = 16;
+pub(super) const ETA: usize = 19;
+/// Share of ambient light that arrives.
+pub(super) const AMBIENT: usize = 20;
+/// Only of those that shine.
+pub(super) const EMISSION: usize = 21;
+/// Number of fields.
+const FIELDS: usize = 24;
+
+/// The points of a level. Lanes of rays that met nothing mean nothing.
+#[derive(Clone, Debug)]
+pub(super) struct Vertices<S> {
+    /// Of each vector of lanes: the rays that met something.
+    pub lanes: Vec<u32>,
+    /// Those that met something that shines by itself.
+    pub shining: Vec<u32>,
+    fields: [Vec<S>; FIELDS],
+}
+
+impl<S: Real> Default for Vertices<S> {
+    fn default() -> Self {
+        Self { lanes: Vec::new(), shining: Vec::new(), fields: std::array::from_fn(|_| Vec::new()) }
+    }
+}
+
+impl<S: Real> Vertices<S> {
+    /// None yet, of `padded` rays with their padding.
+    fn open(&mut self, padded: usize) {
+        self.lanes.clear();
+        self.shining.clear();
+        self.fields.iter_mut().for_each(|field| field.resize(padded, S::ZERO));
+    }
+
+    /// Vectors of lanes in which something was met: the first ray and the lanes.
+    pub fn packets(&self) -> impl Iterator<Item = (usize, u32)> {
+        let numbered = self.lanes.iter().enumerate().filter(|(_, lanes)| **lanes != 0);
+        numbered.map(|(k, &lanes)| (k * S::Wide::N, lanes))
+    }
+
+    /// Field `field` of rays `first..first + N`.
+    #[inline(always)]
+    pub fn scalar<V: Lanes<Scalar = S>>(&self, field: usize, first: usize) -> V {
+        V::load(&self.fields[field][first..])
+    }
+
+    /// Fields `field..field + 3` of the same.
+    #[inline(always)]
+    pub fn vector<V: Lanes<Scalar = S>>(&self, field: usize, first: usize) -> Lanes3<V> {
+        [self.scalar(field, first), self.scalar(field + 1, first), self.scalar(field + 2, first)]
+    }
+
+    /// Origins of rays that leave the points of rays `first..first + N` to the side of the normal.
+    #[inline(always)]
+    pub fn leave<V: Lanes<Scalar = S>>(&self, first: usize) -> Lanes3<V> {
+        let (position, normal) = (self.vector(POSITION, first), self.vector::<V>(NORMAL, first));
+        let offset = self.scalar(OFFSET, first);
+        each(|i| normal[i].mul_add(offset, position[i]))
+    }
+
+    /// Origins of rays that enter the surface.
+    #[inline(always)]
+    pub fn enter<V: Lanes<Scalar = S>>(&self, first: usize) -> Lanes3<V> {
+        let (position, normal) = (self.vector(POSITION, first), self.vector::<V>(NORMAL, first));
+        let offset = -self.scalar::<V>(OFFSET, first);
+        each(|i| normal[i].mul_add(offset, position[i]))
+    }
+
+    /// Fields `field..field + 3` of ray `i`.
+    pub fn at(&self, field: usize, i: usize) -> DVec3 {
+        DVec3::from(each(|axis| self.fields[field + axis][i].to_f64()))
+    }
+
+    #[inline(always)]
+    fn put_lanes<const N: usize>(&mut self, field: usize, first: usize, values: [S::Wide; N]) {
+        values.iter().enumerate().for_each(|(k, value)| value.store(&mut self.fields[field + k][first..]));
+    }
+
+    /// The same in the lanes `lanes` only.
+    #[inline(always)]
+    fn put_some<const N: usize>(&mut self, lanes: u32, field: usize, first: usize, values: [S::Wide; N]) {
+        let mask = <S::Wide as Lanes>::Mask::from_bits(lanes);
+        for (k, value) in values.into_iter().enumerate() {
+            let column = &mut self.fields[field + k][first..];
+            S::Wide::select(mask, value, S::Wide::load(column)).store(column);
+        }
+    }
+
+    fn put(&mut self, field: usize, i: usize, value: DVec3) {
+        (0..3).for_each(|axis| self.fields[field + axis][i] = S::from_f64(value[axis]));
+    }
+}
+
+/// The set bits of `bits`.
+#[inline(always)]
+pub(super) fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = bits.trailing_zeros() as usize;
+        (bits != 0).then(|| {
+            bits &= bits - 1;
+            lane
+        })
+    })
+}
+
+/// Where a vector of rays met surfaces, and whose.
+struct Met<V> {
+    place: Place<V>,
+    material: [u32; MAX_LANES],
+    /// Lanes whose numbers are here.
+    known: u32,
+}
+
+impl<S: Real> Shader<'_, S> {
+    /// The points that `rays` met in `hits`, into `vertices`.
+    pub(super) fn meet(&self, rays: &Rays<S>, hits: &Hits<S>, vertices: &mut Vertices<S>) {
+        vertices.open(rays.padded_len());
+        for first in (0..rays.padded_len()).step_by(S::Wide::N) {
+            let prims = &hits.prim[first..][..S::Wide::N];
+            let hit =
+                prims.iter().enumerate().fold(0, |hit, (lane, &prim)| hit | u32::from(prim != INVALID_ID) << lane);
+            vertices.lanes.push(hit);
+            vertices.shining.push(0);
+            if hit == 0 {
+                continue;
+            }
+            let Met { place, mut material, known } = self.places(rays, hits, first, hit);
+            vertices.put_lanes(POSITION, first, place.position);
+            vertices.put_lanes(NORMAL, first, place.normal);
+            vertices.put_lanes(SHADING, first, place.normal);
+            vertices.put_lanes(OFFSET, first, [place.offset]);
+            let mut front = place.front;
+            // Others are worked out one by one: their materials too, where those are not the same everywhere.
+            let mut settled = 0;
+            for lane in lanes_of(hit) {
+                let is_front = front >> lane & 1 != 0;
+                if known >> lane & 1 != 0 && self.looks.even(material[lane], is_front).is_some() {
+                    continue;
+                }
+                let surface = self.one(rays, hits, first + lane, vertices);
+                let dir = DVec3::from(rays.dir(first + lane).map(S::to_f64));
+                let is_front = surface.ng.dot(dir) <= 0.0;
+                material[lane] = surface.material;
+                front = front & !(1 << lane) | u32::from(is_front) << lane;
+                if self.looks.even(surface.material, is_front).is_none() {
+                    settled |= 1 << lane;
+                    self.settle(&surface, dir, first + lane, vertices);
+                }
+            }
+            self.look_at(rays, first, hit & !settled, &material, front, vertices);
+        }
+    }
+
+    /// Places on shapes and on triangles without shading normals.
+    #[inline(always)]
+    fn places(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize, hit: u32) -> Met<S::Wide> {
+        let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
+        let (dir, t) = (vector(&rays.dir), S::Wide::load(&hits.t[first..]));
+        let zero = S::Wide::constant(0.0);
+        let nowhere = Place { position: [zero; 3], normal: [zero; 3], offset: zero, front: 0 };
+        let mut met = Met { place: nowhere, material: [INVALID_ID; MAX_LANES], known: 0 };
+        if self.has_facets {
+            let facets = self.world.met_facets(rays, hits, first);
+            met.known = facets.hit;
+            if facets.hit != 0 {
+                met.place = Place::on_facet(&facets, vector(&rays.org), dir, t);
+                met.material = facets.material;
+            }
+        }
+        let mut columns = [[S::ZERO; MAX_LANES]; 9];
+        let mut bare = 0;
+        for lane in lanes_of(hit & !met.known) {
+            let i = first + lane;
+            let Some(triangle) = self.bare.get(self.world, &self.looks, hits.prim[i], hits.inst[i]) else { continue };
+            columns.iter_mut().zip(triangle.numbers).for_each(|(column, x)| column[lane] = x);
+            met.material[lane] = triangle.material;
+            bare |= 1 << lane;
+        }
+        if bare != 0 {
+            let edge = |k: usize| each(|axis| S::Wide::load(&columns[3 * k + axis]));
+            let [u, v] = [&hits.u, &hits.v].map(|from| S::Wide::load(&from[first..]));
+            let place = Place::on_triangle([edge(0), edge(1), edge(2)], [u, v, t], dir);
+            // Triangles without area are looked at one by one.
+            let square = dot(place.normal, place.normal);
+            let bare = bare & square.cmp_lt(S::Wide::constant(1.5)).bits();
+            met.place = place.or(bare, met.place);
+            met.known |= bare;
+        }
+        met
+    }
+
+    /// The place of ray `i`'s hit, in f64.
+    fn one(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize, vertices: &mut Vertices<S>) -> Surface<'_> {
+        let org = DVec3::from(rays.org(i).map(S::to_f64));
+        let dir = DVec3::from(rays.dir(i).map(S::to_f64));
+        let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
+        let surface = self.world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);
+        let [normal, shading] = self.turned(&surface, dir);
+        // Two more roundings: of the position, and where the ray starts.
+        let error = position_error::<S>(org, dir, t, surface.position, surface.magnitude)
+            + surface.position.abs() * (2.0 * S::EPSILON.to_f64());
+        vertices.put(POSITION, i, surface.position);
+        vertices.put(NORMAL, i, normal);
+        vertices.put(SHADING, i, shading);
+        vertices.fields[OFFSET][i] = S::from_f64(normal.abs().dot(error));
+        surface
+    }
+
+    /// Unit geometric and shading normal of `surface` on the side that a ray along `dir` comes from.
+    pub(super) fn turned(&self, surface: &Surface<'_>, dir: DVec3) -> [DVec3; 2] {
+        let is_behind = surface.ng.dot(dir) > 0.0;
+        let facing = |n: DVec3| if is_behind { -n } else { n };
+        let normal = facing(surface.ng);
+        if normal.is_finite() && normal != DVec3::ZERO {
+            return [normal, facing(self.looks.bumped(surface.material, surface))];
+        }
+        // A triangle too thin for a normal is seen face on.
+        [-dir.normalize_or_zero(); 2]
+    }
+
+    /// The material of ray `i`'s hit, which textures or the place may change.
+    fn settle(&self, surface: &Surface<'_>, dir: DVec3, i: usize, vertices: &mut Vertices<S>) {
+        let classic = Classic::of(&self.looks, surface, dir);
+        for (field, value) in [(DIFFUSE, classic.diffuse), (MIRROR, classic.mirror), (THROUGH, classic.through)] {
+            vertices.put(field, i, value);
+        }
+        vertices.fields[ETA][i] = S::from_f64(classic.eta);
+        vertices.fields[AMBIENT][i] = S::from_f64(self.looks.ambient(surface.material, surface));
+        if classic.emission != DVec3::ZERO {
+            vertices.put(EMISSION, i, classic.emission);
+            vertices.shining[i / S::Wide::N] |= 1 << (i % S::Wide::N);
+        }
+    }
+
+    /// The materials of the lanes `lanes`, which are the same everywhere on each side.
+    #[inline(always)]
+    fn look_at(
+        &self,
+        rays: &Rays<S>,
+        first: usize,
+        lanes: u32,
+        material: &[u32; MAX_LANES],
+        front: u32,
+        vertices: &mut Vertices<S>,
+    ) {
+        if lanes == 0 {
+            return;
+        }
+        let look_of = |lane: usize| self.looks.even(material[lane], front >> lane & 1 != 0);
+        let dir: Lanes3<S::Wide> = each(|axis| S::Wide::load(&rays.dir[axis][first..]));
+        let cos = dot(vertices.vector::<S::Wide>(NORMAL, first), dir).abs() / dot(dir, dir).sqrt();
+        let cos = cos.fast_min(S::Wide::constant(1.0));
+        let lead = lanes.trailing_zeros() as usize;
+        let is_one = lanes_of(lanes).all(|lane| material[lane] == material[lead])
+            && (front & lanes == 0 || front & lanes == lanes);
+        if is_one {
+            let Some(look) = look_of(lead) else { return };
+            let base = map3(look.base.to_array(), S::Wide::constant);
+            let param = vectors(|k| S::Wide::constant(look.param[k]));
+            self.put_terms(look.model, base, &param, cos, (first, lanes), vertices);
+            return;
+        }
+        let mut columns = Columns::<S>::new();
+        lanes_of(lanes).for_each(|lane| look_of(lane).into_iter().for_each(|look| columns.set(lane, look)));
+        let (base, param) = (each(|c| S::Wide::load(&columns.base[c])), vectors(|k| S::Wide::load(&columns.param[k])));
+        for (model, lanes) in Model::ALL.into_iter().zip(columns.lanes).filter(|(_, lanes)| *lanes != 0) {
+            self.put_terms(model, base, &param, cos, (first, lanes), vertices);
+        }
+    }
+
+    #[inline(always)]
+    fn put_terms(
+        &self,
+        model: Model,
+        base: Lanes3<S::Wide>,
+        param: &[S::Wide; 7],
+        cos: S::Wide,
+        (first, lanes): (usize, u32),
+        vertices: &mut Vertices<S>,
+    ) {
+        let Terms { diffuse, mirror, through, eta } = Terms::of(model, base, param, cos);
+        vertices.put_some(lanes, DIFFUSE, first, diffuse);
+        vertices.put_some(lanes, MIRROR, first, mirror);
+        vertices.put_some(lanes, THROUGH, first, through);
+        vertices.put_some(lanes, ETA, first, [eta]);
+        // What is the same everywhere has no texture of what the ambient light reaches.
+        vertices.put_some(lanes, AMBIENT, first, [S::Wide::constant(1.0)]);
+    }
+}
+
+/// `f` of each parameter; written out, because `map` becomes a call.
+#[inline(always)]
+fn vectors<V: Lanes>(f: impl Fn(usize) -> V) -> [V; 7] {
+    let mut list = [V::constant(0.0); 7];
+    for (k, x) in list.iter_mut().enumerate() {
+        *x = f(k);
+    }
+    list
+}
+
+/// Looks of lanes.
+struct Columns<S> {
+    base: [[S; MAX_LANES]; 3],
+    param: [[S; MAX_LANES]; 7],
+    /// Lanes of each model.
+    lanes: [u32; Model::COUNT],
+}
+
+impl<S: Real> Columns<S> {
+    fn new() -> Self {
+        Self { base: [[S::ZERO; MAX_LANES]; 3], param: [[S::ZERO; MAX_LANES]; 7], lanes: [0; Model::COUNT] }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, look: &Look) {
+        (0..3).for_each(|axis| self.base[axis][lane] = S::from_f64(look.base[axis]));
+        (0..7).for_each(|k| self.param[k][lane] = S::from_f64(look.param[k]));
+        self.lanes[look.model as usize] |= 1 << lane;
+    }
+}
