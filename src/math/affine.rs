@@ -4,7 +4,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use crate::lanes::{Lanes, Lanes3, Real};
+use crate::lanes::{Lanes, Lanes3, Real, map3};
 
 /// Three rows of four: `x' = r[0] * x + r[1] * y + r[2] * z + r[3]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,19 +23,15 @@ impl<S: Real> Affine<S> {
     /// Points, `N` at a time.
     #[inline(always)]
     pub fn points<V: Lanes<Scalar = S>>(&self, p: Lanes3<V>) -> Lanes3<V> {
-        self.rows.map(|r| {
-            let s = r.map(V::splat);
-            s[0].mul_add(p[0], s[1].mul_add(p[1], s[2].mul_add(p[2], s[3])))
+        map3(self.rows, |[x, y, z, w]| {
+            V::splat(x).mul_add(p[0], V::splat(y).mul_add(p[1], V::splat(z).mul_add(p[2], V::splat(w))))
         })
     }
 
     /// Directions, `N` at a time.
     #[inline(always)]
     pub fn vectors<V: Lanes<Scalar = S>>(&self, d: Lanes3<V>) -> Lanes3<V> {
-        self.rows.map(|r| {
-            let s = r.map(V::splat);
-            s[0].mul_add(d[0], s[1].mul_add(d[1], s[2] * d[2]))
-        })
+        map3(self.rows, |[x, y, z, _]| V::splat(x).mul_add(d[0], V::splat(y).mul_add(d[1], V::splat(z) * d[2])))
     }
 }
 

@@ -78,6 +78,8 @@ pub struct Memory {
     levels: Vec<node::Level>,
     /// For leaves of shapes.
     stack: Stack<f32>,
+    /// Leaves and instances that a tile may still visit among instances before it gives up.
+    effort: u32,
     /// Where groups start that are for the stream kernel.
     rest: Vec<usize>,
 }
@@ -227,7 +229,11 @@ impl Job<'_> {
             return false;
         }
         let exact = Exact { bundle, world: self.world, object: self.world.first_object() };
-        walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
+        if !walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters) {
+            let starts = (0..N * SET).filter(|g| groups >> g & 1 != 0).map(|g| bundle.first + g * V::N);
+            self.memory.rest.extend(starts);
+            return true;
+        }
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
             if !self.past {
                 self.output.prefetch(bundle.first + (g + bundle::AHEAD) * V::N);

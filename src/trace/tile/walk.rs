@@ -43,14 +43,21 @@ struct Blocks<'a> {
 /// Instances.
 struct Instances<'a>(&'a World<f32>);
 
-/// Traces the `N` sets that are loaded in `memory` through the world.
+/// Leaves and instances per ray after which a tile among instances gives up: what it looks at is so small that its rays
+/// have little in common, and the stream kernel takes the ones that are wanted by a leaf, not the tile.
+const EFFORT: f32 = 1.0;
+
+/// What entering an instance costs, in leaves.
+const ENTRY: u32 = 2;
+
+/// Traces the `N` sets that are loaded in `memory` through the world. False if it gave up.
 #[inline(always)]
 pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     memory: &mut Memory,
     exact: &Exact,
     groups: u64,
     counters: &mut Counters,
-) {
+) -> bool {
     memory.batch.clear();
     memory.slabs.start();
     let frame = &memory.groups.frame;
@@ -60,7 +67,11 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
         let margin = place::margin(exact.world, frame);
         let planes = Planes::of(&memory.groups, frame, margin);
         let view = View { tree: &exact.world.top, planes, space: space(margin), first: 0 };
+        memory.effort = (EFFORT * (groups.count_ones() * V::N as u32) as f32) as u32;
         descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &Instances(exact.world), groups, counters);
+        if memory.effort == 0 {
+            return false;
+        }
     } else {
         let margin = node::MARGIN * HALF_ULP * frame.extent;
         let planes = Planes::of(&memory.groups, frame, margin);
@@ -71,6 +82,7 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
     if memory.batch.len() > 0 {
         flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
     }
+    true
 }
 
 /// Takes some groups through a tree.
@@ -130,6 +142,12 @@ fn limit(memory: &Memory) -> u32 {
     if farthest == f32::NEG_INFINITY { 0 } else { (u32::from(key(farthest)) + 1).min(0xffff) }
 }
 
+/// Whether a leaf of an object's tree holds something else than triangles.
+#[inline(always)]
+fn is_of_shapes(leaf: Child) -> bool {
+    leaf.class != Class::Triangle as u8
+}
+
 #[inline(always)]
 fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     view: &View,
@@ -175,13 +193,14 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
 
     #[inline(always)]
     fn is_dear(&self, leaf: Child) -> bool {
-        !EXACT && leaf.class != Class::Triangle as u8
+        !EXACT && is_of_shapes(leaf)
     }
 
     #[inline(always)]
     fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters) {
         if let Some(place) = self.place
-            && self.is_dear(leaf)
+            && !EXACT
+            && is_of_shapes(leaf)
         {
             let Memory { groups: state, stack, .. } = memory;
             let shapes = (self.object, place.inst);
@@ -197,7 +216,10 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
         }
         let block = &self.object.triangles[leaf.index as usize];
         match self.place {
-            Some(place) if !EXACT => memory.batch.push_placed::<ANY>(block, leaf.index * 8, count, groups, place),
+            Some(place) if !EXACT => {
+                memory.effort = memory.effort.saturating_sub(1);
+                memory.batch.push_placed::<ANY>(block, leaf.index * 8, count, groups, place);
+            }
             _ => memory.batch.push::<EXACT>(block, leaf.index * 8, count, groups),
         }
     }
@@ -218,6 +240,12 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
 
     #[inline(always)]
     fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters) {
+        memory.effort = memory.effort.saturating_sub(ENTRY);
+        if memory.effort == 0 {
+            // Nothing is wanted any more: the way ends here.
+            memory.groups.farthest = f32::NEG_INFINITY;
+            return;
+        }
         let (world, state) = (self.0, &memory.groups);
         let place = Place::new(world, world.top_leaves[leaf.index as usize], &state.frame);
         let planes = Planes::of(state, &place.frame, node::MARGIN * HALF_ULP * place.frame.extent);
