@@ -34,7 +34,7 @@ impl Chosen {
     }
 
     /// How many there are.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.count
     }
 
@@ -44,7 +44,7 @@ impl Chosen {
         self.list[..self.count].iter().map(|&lane| usize::from(lane) % MAX_LANES)
     }
 
-    /// Writes their values to the first places of `to`, which has [`Self::len`] at least.
+    /// Writes their values to the first places of `to`, which has [`Self::count`] at least.
     #[inline(always)]
     pub fn pack<V: Lanes>(&self, from: V, to: &mut [V::Scalar]) {
         if self.count == V::N {
@@ -67,7 +67,7 @@ mod tests {
         for bits in [0u32, 1, 0x8000, 0b1010_0110_0001, 0xffff] {
             let want: Vec<usize> = (0..16).filter(|i| bits >> i & 1 != 0).collect();
             let chosen = Chosen::of(bits);
-            assert_eq!((chosen.iter().collect::<Vec<_>>(), chosen.len()), (want.clone(), want.len()));
+            assert_eq!((chosen.iter().collect::<Vec<_>>(), chosen.count()), (want.clone(), want.len()));
             let mut to = [-1.0; 17];
             chosen.pack(v, &mut to);
             assert!(want.iter().zip(to).all(|(&lane, x)| x == lane as f32 * 0.5) && to[want.len()] == -1.0);

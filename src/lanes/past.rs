@@ -40,7 +40,7 @@ mod tests {
     fn everything_arrives_wherever_it_lies() {
         let x = std::array::from_fn(|i| (i as u32).wrapping_mul(0x9e37_79b9));
         for first in 0..8 {
-            let mut list = vec![7; 40];
+            let mut list = [7; 40];
             store_past(&x, list[first..].first_chunk_mut().unwrap());
             arrived();
             assert_eq!(list[first..first + 16], x);

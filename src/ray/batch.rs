@@ -89,7 +89,7 @@ impl<S: Real> Rays<S> {
             chosen.pack(org[axis], &mut self.org[axis][first..]);
             chosen.pack(dir[axis], &mut self.dir[axis][first..]);
         }
-        self.t_min[first..first + chosen.len()].fill(S::ZERO);
+        self.t_min[first..first + chosen.count()].fill(S::ZERO);
         chosen.pack(t_max, &mut self.t_max[first..]);
     }
 

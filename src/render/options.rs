@@ -143,6 +143,7 @@ impl RenderOptions {
             cost: self.integrator == Integrator::Cost || self.aovs.contains(&Aov::Cost),
             first_hits: !self.aovs.is_empty(),
             count: self.count,
+            rays: u64::from(self.width) * u64::from(self.height) * u64::from(self.spp),
         }
     }
 }

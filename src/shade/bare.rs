@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::look::Looks;
 use crate::lanes::Real;
 use crate::scene::world::World;
-use crate::shade::look::Looks;
 
 /// Most triangles that are kept.
 const MAX_KEPT: u32 = 1 << 20;
@@ -20,17 +20,18 @@ pub struct Bare<S> {
     pub material: u32,
 }
 
-/// Bare triangles by primitive number, where the world is one object of moderate size; others are worked out hit by hit.
+/// Bare triangles by primitive number, where the world is one object of moderate size and there are
+/// rays enough; others are worked out hit by hit.
 #[derive(Debug, Default)]
 pub struct BareTriangles<S> {
     kept: Vec<Bare<S>>,
 }
 
 impl<S: Real> BareTriangles<S> {
-    /// Those of `world`.
-    pub fn new(world: &World<S>, looks: &Looks<'_>) -> Self {
+    /// Those of `world`, which `rays` primary rays are to be traced through.
+    pub fn new(world: &World<S>, looks: &Looks<'_>, rays: u64) -> Self {
         let count = world.assembly.objects.first().map_or(0, |object| object.prim_count);
-        if !world.is_single_object() || count > MAX_KEPT {
+        if !world.is_single_object() || count > MAX_KEPT || 2 * u64::from(count) > rays {
             return Self { kept: Vec::new() };
         }
         let other = Bare { numbers: [S::ZERO; 9], material: OTHER };

@@ -47,6 +47,8 @@ pub struct Settings {
     pub first_hits: bool,
     /// Whether all engine calls count ([`Workspace::counters`]); counting kernels are slower.
     pub count: bool,
+    /// Primary rays to be expected, which may be a guess: what is worth preparing.
+    pub rays: u64,
 }
 
 /// Working memory of one thread, and what was counted in it.
@@ -139,7 +141,7 @@ impl<'a, S: Real> Shader<'a, S> {
         let paths = (settings.integrator == Integrator::Path)
             .then(|| Paths::new(world, description, looks.clone(), engine, &settings));
         let bare = if settings.integrator.works_on_vertices() {
-            BareTriangles::new(world, &looks)
+            BareTriangles::new(world, &looks, settings.rays)
         } else {
             BareTriangles::default()
         };

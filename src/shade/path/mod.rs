@@ -109,7 +109,7 @@ impl<'a, S: Real> Paths<'a, S> {
         let lights = Lights::new(world, description, &looks);
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
         let Settings { depth, seed, first_hits, .. } = *settings;
-        let (has_facets, bare) = (world.has_facets(), BareTriangles::new(world, &looks));
+        let (has_facets, bare) = (world.has_facets(), BareTriangles::new(world, &looks, settings.rays));
         Self { world, engine, looks, lights, depth, seed, first_hits, shadow_end, has_facets, bare }
     }
 

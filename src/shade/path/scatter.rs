@@ -300,7 +300,7 @@ fn go_on<S: Real, B: Bsdf<S::Wide>>(
     bounce: u32,
     next: &mut Wave<S>,
 ) {
-    let (zero, one) = (S::Wide::constant(0.0), S::Wide::constant(1.0));
+    let zero = S::Wide::constant(0.0);
     let place = [S::Wide::load(&numbers.place[0]), S::Wide::load(&numbers.place[1])];
     let sampled = bsdf.sample(packet.out, place, S::Wide::load(&numbers.choice));
     let dir = packet.frame.to_world(sampled.wi);

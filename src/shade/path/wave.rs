@@ -60,7 +60,7 @@ impl<S: Real> Wave<S> {
         self.rays.put(first, chosen, [org, dir], S::Wide::splat(S::INFINITY));
         extend(&mut self.throughput, chosen, throughput);
         for (list, values) in [(&mut self.pdf, pdf), (&mut self.squeeze, squeeze)] {
-            list.resize(first + chosen.len(), S::ZERO);
+            list.resize(first + chosen.count(), S::ZERO);
             chosen.pack(values, &mut list[first..]);
         }
     }
