@@ -37,7 +37,10 @@ fn maps(r: &mut Random, centre: DVec3) -> Vec<DAffine3> {
             0 => DAffine3::from_axis_angle(r.direction(), r.unit() * 6.0),
             1 => DAffine3::from_scale(DVec3::new(0.05 + r.unit(), 0.05 + r.unit(), -0.05 - r.unit())),
             2 => r.affine(0.3),
-            3 => r.affine(0.01 + 0.05 * r.unit()),
+            3 => {
+                let size = 0.01 + 0.05 * r.unit();
+                r.affine(size)
+            }
             _ => DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.01)) * r.affine(0.5),
         };
         map.translation = centre + r.in_cube() * 6.0;
