@@ -65,8 +65,6 @@ pub fn fill_tile<S: Real>(
     let count = tiling.rays_per_tile() as usize;
     let (x0, y0) = tiling.origin(tile);
     // Places on the image plane in units of u and v: Hill's W (2c / nCols - 1) and H (2r / nRows - 1).
-    let mut a = [0.0; LARGEST_BATCH];
-    let mut b = [0.0; LARGEST_BATCH];
     let (columns, rows) = (f64::from(tiling.width()), f64::from(tiling.height()));
     let across = |x: u32, sx: f64| {
         let c = f64::from(x) + sx;
@@ -76,44 +74,75 @@ pub fn fill_tile<S: Real>(
         let r = rows - (f64::from(y) + sy);
         camera.half_height * (2.0 * r / rows - 1.0)
     };
+    rays.prepare(count);
     if sub_pixel == SubPixel::Anchor {
         // One place in all pixels: a column's pixels have one a, a row's one b.
-        let (mut of_column, mut of_row) = ([0.0; FILE_TILE as usize], [0.0; FILE_TILE as usize]);
-        for k in 0..tiling.edge() {
-            of_column[k as usize] = across(x0 + k, camera.anchor[0]);
-            of_row[k as usize] = up(y0 + k, camera.anchor[1]);
+        let edge = tiling.edge() as usize;
+        let (mut a, mut b) = ([0.0; FILE_TILE as usize], [0.0; FILE_TILE as usize]);
+        for k in 0..edge {
+            a[k] = across(x0 + k as u32, camera.anchor[0]);
+            b[k] = up(y0 + k as u32, camera.anchor[1]);
         }
-        for i in 0..count {
-            let (dx, dy) = morton_decode(i as u32);
-            (a[i], b[i]) = (of_column[dx as usize], of_row[dy as usize]);
+        for axis in 0..3 {
+            let (au, bv) = (a.map(|a| a * camera.u[axis]), b.map(|b| b * camera.v[axis]));
+            let (org, dir) = (&mut rays.org[axis][..count], &mut rays.dir[axis][..count]);
+            let (eye, n) = (camera.eye[axis], camera.n[axis]);
+            if camera.parallel {
+                blocks(&au, &bv, org, |au, bv| eye + (au + bv));
+                dir.fill(S::from_f64(-n));
+            } else {
+                org.fill(S::from_f64(eye));
+                blocks(&au, &bv, dir, |au, bv| au + bv - n);
+            }
         }
     } else {
+        let mut a = [0.0; LARGEST_BATCH];
+        let mut b = [0.0; LARGEST_BATCH];
         for i in 0..count {
             let (dx, dy) = morton_decode(i as u32);
             let [sx, sy] = sub_pixel.offset(camera.anchor, x0 + dx, y0 + dy);
             (a[i], b[i]) = (across(x0 + dx, sx), up(y0 + dy, sy));
         }
-    }
-    rays.reset(count);
-    for axis in 0..3 {
-        let (eye, u, v, n) = (camera.eye[axis], camera.u[axis], camera.v[axis], camera.n[axis]);
-        let (org, dir) = (&mut rays.org[axis][..count], &mut rays.dir[axis][..count]);
-        if camera.parallel {
-            for i in 0..count {
-                org[i] = S::from_f64(eye + (a[i] * u + b[i] * v));
-                dir[i] = S::from_f64(-n);
-            }
-        } else {
-            for i in 0..count {
-                org[i] = S::from_f64(eye);
-                dir[i] = S::from_f64(a[i] * u + b[i] * v - n);
+        for axis in 0..3 {
+            let (eye, u, v, n) = (camera.eye[axis], camera.u[axis], camera.v[axis], camera.n[axis]);
+            let (org, dir) = (&mut rays.org[axis][..count], &mut rays.dir[axis][..count]);
+            if camera.parallel {
+                org.iter_mut()
+                    .zip(a.iter().zip(&b))
+                    .for_each(|(org, (a, b))| *org = S::from_f64(eye + (a * u + b * v)));
+                dir.fill(S::from_f64(-n));
+            } else {
+                org.fill(S::from_f64(eye));
+                dir.iter_mut().zip(a.iter().zip(&b)).for_each(|(dir, (a, b))| *dir = S::from_f64(a * u + b * v - n));
             }
         }
     }
-    let (zero, infinity) = (S::from_f64(0.0), S::from_f64(f64::INFINITY));
-    rays.t_min[..count].fill(zero);
-    rays.t_max[..count].fill(infinity);
+    rays.t_min[..count].fill(S::ZERO);
+    rays.t_max[..count].fill(S::INFINITY);
     kill_outside(tiling, (x0, y0), rect, rays);
+}
+
+/// Sixteen rays that follow each other are a square of 4 x 4 pixels: `value` of what each one's column and row have.
+#[inline(always)]
+fn blocks<S: Real>(
+    of_column: &[f64; FILE_TILE as usize],
+    of_row: &[f64; FILE_TILE as usize],
+    to: &mut [S],
+    value: impl Fn(f64, f64) -> f64,
+) {
+    const X: [usize; 16] = [0, 1, 0, 1, 2, 3, 2, 3, 0, 1, 0, 1, 2, 3, 2, 3];
+    const Y: [usize; 16] = [0, 0, 1, 1, 0, 0, 1, 1, 2, 2, 3, 3, 2, 2, 3, 3];
+    for (block, to) in to.chunks_exact_mut(16).enumerate() {
+        let (x, y) = morton_decode(block as u32);
+        let (Some(columns), Some(rows)) =
+            (of_column[4 * x as usize..].first_chunk::<4>(), of_row[4 * y as usize..].first_chunk::<4>())
+        else {
+            return;
+        };
+        for (k, to) in to.iter_mut().enumerate() {
+            *to = S::from_f64(value(columns[X[k]], rows[Y[k]]));
+        }
+    }
 }
 
 /// Makes the rays dead whose pixel lies outside the picture or outside `rect`.

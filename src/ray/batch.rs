@@ -48,6 +48,15 @@ impl<S: Real> Rays<S> {
         self.t_min.resize(padded, S::from_f64(1.0));
     }
 
+    /// Makes this a batch of `len` rays with unspecified contents, for who sets all of them; padding is dead.
+    pub fn prepare(&mut self, len: usize) {
+        if len.is_multiple_of(PAD) && self.padded_len() == len {
+            self.len = len;
+        } else {
+            self.reset(len);
+        }
+    }
+
     /// Keeps the first `len` rays; those after them must be dead.
     pub fn truncate(&mut self, len: usize) {
         let padded = len.next_multiple_of(PAD);
