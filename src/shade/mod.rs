@@ -6,6 +6,7 @@
 
 mod ambient_occlusion;
 mod classic;
+mod glow;
 mod integrator;
 mod lights;
 mod look;

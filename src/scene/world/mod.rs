@@ -9,6 +9,7 @@ mod runs;
 mod solids;
 mod successor;
 mod surface;
+mod uv;
 
 use glam::DVec3;
 
