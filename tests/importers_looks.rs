@@ -83,6 +83,33 @@ fn an_obj_file_brings_its_materials_and_textures() {
     assert_eq!((mesh.uvs[0].indices.len(), mesh.normals.indices.len()), (0, 8));
 }
 
+/// Pictures of roughness and metal, each of its own: the one goes where glTF has it, and says nothing of metal.
+#[test]
+fn roughness_and_metal_have_pictures() {
+    let grey = png(2, &[[64, 64, 64, 255], [255, 255, 255, 255]]);
+    let obj = format!("mtllib a.mtl\n{SQUARE}usemtl a\n{FACE}usemtl b\n{FACE}usemtl c\n{FACE}");
+    let library = "newmtl a\nmap_Pr -s 2 g.png\nmap_Pm g.png\nnewmtl b\nPr 0.5\nPm 0\nmap_Pm g.png\n\
+                   newmtl c\nPr 0.5\nmap_Pr g.png\n";
+    let folder = folder(&[("m.obj", obj.as_bytes()), ("a.mtl", library.as_bytes()), ("g.png", &grey)]);
+    let scene = open(&folder, "m.obj").unwrap();
+    assert_eq!(scene.warnings, [""; 0]);
+    let of = |name: &str| {
+        let material = named(&scene, name);
+        let Scattering::MetallicRoughness { metallic, roughness, .. } = material.scattering else { panic!("{name}") };
+        ([roughness, metallic], &material.textures)
+    };
+    let texels = |used: Option<TextureRef>| &scene.textures[used.unwrap().texture as usize].texels;
+    let (numbers, textures) = of("a");
+    assert_eq!(numbers, [1.0, 1.0], "a map alone is meant as it is");
+    assert_eq!(texels(textures.metallic_roughness), &Texels::Linear8(vec![[255, 64, 255, 255], [255; 4]]));
+    assert_eq!(texels(textures.metallic), &Texels::Linear8(vec![[64, 64, 64, 255], [255; 4]]));
+    assert_eq!(textures.metallic_roughness.unwrap().transform.matrix2.x_axis.x, 2.0);
+    let (numbers, textures) = of("b");
+    assert_eq!((numbers, textures.metallic_roughness), ([0.5, 1.0], None), "a factor of zero would hide the map");
+    let (numbers, textures) = of("c");
+    assert_eq!((numbers, textures.metallic), ([0.5, 0.0], None));
+}
+
 #[test]
 fn what_is_missing_is_a_warning_and_what_is_damaged_an_error() {
     let obj = format!("mtllib a.mtl gone.mtl ../up.mtl\n{SQUARE}usemtl m\n{FACE}f 1/9 2/1 3/1\n");

@@ -228,7 +228,8 @@ fn lights_and_facets_share_their_chances_rightly() {
         let want = 5.0 * sum * TAU * cone / f64::from(STEPS * STEPS);
         let mut d = dark();
         let metal = Scattering::Conductor { eta: DVec3::splat(eta), k: DVec3::splat(k), roughness };
-        let (metal, shining) = (add(&mut d, scatters(metal, DVec3::ONE)), add(&mut d, lamp(5.0)));
+        let single = Material { multiple_scattering: false, ..scatters(metal, DVec3::ONE) };
+        let (metal, shining) = (add(&mut d, single), add(&mut d, lamp(5.0)));
         plane(&mut d, 0.0, metal);
         sphere(&mut d, towards * distance, radius, shining);
         let got = seen::<f32>(&d, &under(30.0), &paths(8, 4096, 1));

@@ -72,10 +72,52 @@ fn metals_show_their_reflectance() {
         let material = |roughness| scatters(Scattering::Conductor { eta: ETA, k: K, roughness }, DVec3::ONE);
         near("smooth", albedo::<f32>(material(0.0), degrees), want, 1e-5);
         near("smooth, f64", albedo::<f64>(material(0.0), degrees), want, 1e-6);
-        for roughness in [0.3, 0.7, 1.0f64] {
-            let want = color(|c| facets::mirrored(o, roughness.powi(2), |cos| facets::metal(cos, ETA[c], K[c])));
-            near(&format!("{roughness} {degrees}"), albedo::<f32>(material(roughness), degrees), want, CLOSE);
-            assert!(want.max_element() < 1.0);
+    }
+    for roughness in [0.3, 0.7, 1.0f64] {
+        let alpha = roughness.powi(2);
+        let once = facets::mirrored_mean(alpha, |_| 1.0);
+        for degrees in [0.0, 45.0, 80.0] {
+            let o = out(degrees);
+            let lost = 1.0 - facets::mirrored(o, alpha, |_| 1.0);
+            let single = color(|c| facets::mirrored(o, alpha, |cos| facets::metal(cos, ETA[c], K[c])));
+            let many = color(|c| {
+                let mean = facets::cosine_mean(|w| facets::metal(w.z, ETA[c], K[c]));
+                lost * facets::repeated(mean, once)
+            });
+            let mut material = scatters(Scattering::Conductor { eta: ETA, k: K, roughness }, DVec3::ONE);
+            near(&format!("{roughness} {degrees}"), albedo::<f32>(material.clone(), degrees), single + many, CLOSE);
+            material.multiple_scattering = false;
+            near(&format!("{roughness} {degrees}, single"), albedo::<f32>(material, degrees), single, CLOSE);
+        }
+    }
+}
+
+/// Rough surfaces of white, seen steeply and at a grazing angle: all light comes back, none is added.
+#[test]
+fn white_facets_keep_all_light() {
+    for roughness in [0.05, 0.2, 0.4, 0.6, 0.8, 1.0] {
+        for degrees in [0.0, 45.0, 70.0, 85.0, 89.0] {
+            let (eta, k) = (DVec3::ZERO, DVec3::ONE);
+            let mut whites = vec![
+                Scattering::Conductor { eta, k, roughness },
+                Scattering::Plastic { ior: 1.5, roughness },
+                Scattering::Plastic { ior: 2.5, roughness },
+            ];
+            for [metallic, transmission] in [[0.0, 0.0], [0.0, 1.0], [0.5, 0.5], [1.0, 0.0]] {
+                whites.push(Scattering::MetallicRoughness { metallic, roughness, ior: 1.5, transmission });
+            }
+            for white in whites {
+                let got = many::<f32>(scatters(white, DVec3::ONE), degrees);
+                near(&format!("{white:?} under {degrees}"), got, DVec3::ONE, CLOSE);
+            }
+            // What a boundary lets through is squeezed: it is told apart by its tint.
+            for ior in [1.5, 0.75] {
+                let glass = |tint| Scattering::Dielectric { ior, roughness, tint: DVec3::splat(tint) };
+                let mirrored = many::<f64>(scatters(glass(0.0), DVec3::ONE), degrees);
+                let both = many::<f64>(scatters(glass(1.0), DVec3::ONE), degrees);
+                let all = mirrored + (both - mirrored) * (ior * ior);
+                near(&format!("glass of {ior}, {roughness} under {degrees}"), all, DVec3::ONE, CLOSE);
+            }
         }
     }
 }
@@ -86,7 +128,10 @@ fn glass_boundaries_show_what_they_mirror_and_let_through() {
     let (ior, tint) = (1.5, DVec3::new(1.0, 0.8, 0.6));
     for degrees in [0.0, 45.0, 80.0] {
         let o = out(degrees);
-        let material = |roughness| scatters(Scattering::Dielectric { ior, roughness, tint }, DVec3::ONE);
+        let material = |roughness| {
+            let glass = scatters(Scattering::Dielectric { ior, roughness, tint }, DVec3::ONE);
+            Material { multiple_scattering: false, ..glass }
+        };
         let mirrored = facets::glass(o.z, ior);
         let want = mirrored + tint * (1.0 - mirrored) / (ior * ior);
         near("smooth", albedo::<f32>(material(0.0), degrees), want, CLOSE);
@@ -109,6 +154,8 @@ fn clear_glass_is_invisible() {
         Scattering::Dielectric { ior: 1.5, roughness: 0.0, tint: DVec3::ONE },
         Scattering::Dielectric { ior: 0.7, roughness: 0.0, tint: DVec3::ONE },
         Scattering::ThinGlass { ior: 1.5, tint: DVec3::ONE },
+        Scattering::Dielectric { ior: 1.5, roughness: 0.3, tint: DVec3::ONE },
+        Scattering::Dielectric { ior: 1.33, roughness: 0.8, tint: DVec3::ONE },
     ] {
         let mut d = white(dark());
         let id = add(&mut d, scatters(scattering, DVec3::ONE));
@@ -145,8 +192,12 @@ fn plastic_keeps_all_light_over_a_white_base() {
         near("colour", albedo::<f32>(material(0.0, BASE), degrees), want, CLOSE);
         near("colour, f64", albedo::<f64>(material(0.0, BASE), degrees), want, CLOSE);
         for roughness in [0.3, 0.8f64] {
-            let coat = facets::mirrored(o, roughness.powi(2), |cos| facets::glass(cos, ior));
-            let want = color(|c| coat + base(BASE[c]));
+            let alpha = roughness.powi(2);
+            let coat = facets::mirrored(o, alpha, |cos| facets::glass(cos, ior));
+            // As much light goes out through the coat as comes in, but for the square of the index.
+            let inside = 1.0 - (1.0 - facets::mirrored_mean(alpha, |cos| facets::glass(cos, ior))) / (ior * ior);
+            let base = |c: f64| c * (1.0 - inside) / (1.0 - c * inside);
+            let want = color(|c| coat + (1.0 - coat) * base(BASE[c]));
             near(&format!("{roughness} {degrees}"), many::<f32>(material(roughness, BASE), degrees), want, CLOSE);
         }
     }
@@ -157,16 +208,18 @@ fn metallic_roughness_shows_its_blend() {
     let ior = 1.5f64;
     for (metallic, roughness, transmission) in [(0.0, 0.5, 0.0), (1.0, 0.4, 0.0), (0.5, 1.0, 0.3), (0.0, 0.6, 1.0)] {
         let material = scatters(Scattering::MetallicRoughness { metallic, roughness, ior, transmission }, BASE);
+        let mean = facets::mirrored_mean(f64::powi(roughness, 2), |_| 1.0);
         for degrees in [0.0, 60.0] {
             let (o, alpha) = (out(degrees), f64::powi(roughness, 2));
+            let lost = 1.0 - facets::mirrored(o, alpha, |_| 1.0);
             let want = color(|c| {
                 let f0 = metallic * BASE[c] + (1.0 - metallic) * ((ior - 1.0) / (ior + 1.0)).powi(2);
                 let body = BASE[c] * (1.0 - metallic);
-                let f = |cos: f64| facets::schlick(cos, f0);
-                let up = facets::mirrored(o, alpha, f);
-                let down = facets::mirrored(o, alpha, |cos| 1.0 - f(cos)) * body * transmission;
-                let under = facets::cosine_mean(|w| 1.0 - f(o.dot((o + w).normalize()))) * body * (1.0 - transmission);
-                up + down + under
+                let once = facets::mirrored(o, alpha, |cos| facets::schlick(cos, f0));
+                let many = facets::repeated(f0 + (1.0 - f0) / 21.0, mean);
+                let down = (1.0 - lost - once) + lost * (1.0 - many);
+                let under = 1.0 - once - lost * many;
+                once + lost * many + body * (down * transmission + under * (1.0 - transmission))
             });
             let got = many::<f32>(material.clone(), degrees);
             near(&format!("{metallic} {roughness} {transmission} {degrees}"), got, want, CLOSE);

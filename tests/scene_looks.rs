@@ -58,6 +58,11 @@ fn models_of_scattering() {
         scattering("conductor { eta 0.2 0.4 1; k 3; roughness 0.1 }"),
         Scattering::Conductor { eta: DVec3::new(0.2, 0.4, 1.0), k: DVec3::splat(3.0), roughness: 0.1 }
     );
+    let single = |text: &str| !material(text).multiple_scattering;
+    assert!(
+        single("conductor gold roughness=0.2 single-scattering=#true") && single("dielectric { single-scattering }")
+    );
+    assert!(!single("conductor gold") && !single("plastic roughness=0.5"));
     let Scattering::Conductor { eta, k, roughness } = scattering("conductor gold roughness=0.2") else { panic!() };
     // Johnson and Christy: at 617 and 582 nm eta is 0.21 and 0.29, k 3.272 and 2.863.
     assert!((0.21..0.29).contains(&eta.x) && (2.863..3.272).contains(&k.x) && roughness == 0.2);

@@ -104,7 +104,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FRACTION", default_value_t = 0.2, allow_negative_numbers = true)]
     ao_radius: f64,
     /// Extra planes: Z, N, Ns, P, albedo, direct, indirect, id.instance, id.primitive, id.material, variance, samples,
-    /// cost.nodes, or all
+    /// cost.nodes, all of these, or cryptomatte
     #[arg(long, value_name = "LIST", default_value = "")]
     aov: String,
     /// Brightness of PNG and .pix files: colours times 2^STOPS

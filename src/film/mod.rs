@@ -5,6 +5,7 @@
 //! All readers take hostile input: what a header claims is checked against the file's length before memory is taken.
 
 pub mod atomic;
+pub mod cryptomatte;
 pub mod exr;
 pub mod heat;
 pub mod mesh;

@@ -110,6 +110,8 @@ pub struct Film {
     pub window: Window,
     /// The planes, in any order.
     pub planes: Vec<Plane>,
+    /// What the planes mean, as names and values, for formats that keep such texts (EXR: attributes).
+    pub texts: Vec<(String, String)>,
 }
 
 impl Film {
@@ -118,7 +120,7 @@ impl Film {
     /// # Errors
     /// [`Error::Usage`] if the window is empty or not inside the picture.
     pub fn new(width: u32, height: u32, window: Window) -> Result<Self> {
-        let film = Self { width, height, window, planes: Vec::new() };
+        let film = Self { width, height, window, planes: Vec::new(), texts: Vec::new() };
         film.validate()?;
         Ok(film)
     }

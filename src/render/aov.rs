@@ -58,11 +58,15 @@ pub enum Aov {
     Samples,
     /// `cost.nodes`: node visits per primary ray (see [`crate::shade::Sample::nodes`]).
     Cost,
+    /// `cryptoObject00.R` and so on, `cryptoMaterial00.R` and so on: ids and coverages of what a pixel shows
+    /// ([`crate::film::cryptomatte`]).
+    Cryptomatte,
 }
 
 impl Aov {
-    /// All of them, in the order of the film's planes.
-    pub const ALL: [Self; 13] = [
+    /// All of them, in the order of the film's planes; `all` on the command line means those before the last, whose
+    /// many planes are only for programs that know them.
+    pub const ALL: [Self; 14] = [
         Self::Z,
         Self::Normal,
         Self::Albedo,
@@ -76,6 +80,7 @@ impl Aov {
         Self::Material,
         Self::Variance,
         Self::Samples,
+        Self::Cryptomatte,
     ];
 
     /// Name on the command line.
@@ -94,10 +99,11 @@ impl Aov {
             Self::Material => "id.material",
             Self::Variance => "variance",
             Self::Samples => "samples",
+            Self::Cryptomatte => "cryptomatte",
         }
     }
 
-    /// Its planes.
+    /// Its planes that show one number of a pixel; those of [`Self::Cryptomatte`] are made otherwise.
     pub fn channels(self) -> &'static [Channel] {
         match self {
             Self::Z => &[Channel { name: "Z", get: Get::F32(|s| s.distance) }],
@@ -137,10 +143,11 @@ impl Aov {
             Self::Material => &[Channel { name: "id.material", get: Get::U32(|s| s.material) }],
             Self::Variance => &[Channel { name: "variance", get: Get::F32(|s| s.square) }],
             Self::Samples => &[Channel { name: "samples", get: Get::U32(|s| s.samples) }],
+            Self::Cryptomatte => &[],
         }
     }
 
-    /// Reads a comma-separated list; `all` is all of them. The result is in the order of [`Aov::ALL`], each once.
+    /// Reads a comma-separated list; `all` is all but [`Self::Cryptomatte`]. The result is in the order of [`Aov::ALL`], each once.
     ///
     /// # Errors
     /// A usage error that lists the names and the nearest one.
@@ -149,7 +156,7 @@ impl Aov {
         for name in list.split(',').map(str::trim).filter(|name| !name.is_empty()) {
             match Self::ALL.into_iter().find(|aov| aov.name() == name) {
                 Some(aov) => wanted.push(aov),
-                None if name == "all" => wanted.extend(Self::ALL),
+                None if name == "all" => wanted.extend(Self::ALL.into_iter().filter(|&aov| aov != Self::Cryptomatte)),
                 None => {
                     let names = Self::ALL.map(Self::name);
                     let near = nearest_name(name, names);
@@ -170,7 +177,8 @@ mod tests {
     #[test]
     fn lists_are_sorted_and_misspellings_explained() {
         assert_eq!(Aov::parse_list("N, Z,N").unwrap(), [Aov::Z, Aov::Normal]);
-        assert_eq!(Aov::parse_list("all").unwrap(), Aov::ALL);
+        assert_eq!(Aov::parse_list("all,cryptomatte").unwrap(), Aov::ALL);
+        assert_eq!(Aov::parse_list("all").unwrap(), Aov::ALL[..13]);
         assert_eq!(Aov::parse_list("").unwrap(), []);
         let message = Aov::parse_list("albdo").unwrap_err().to_string();
         assert!(message.contains("did you mean `albedo`?"), "{message}");

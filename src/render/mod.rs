@@ -1,6 +1,7 @@
 //! Pictures: tiles over threads, samples into pixels, pixels into a film; at once, or block by block while one watches.
 
 mod aov;
+mod mattes;
 mod options;
 mod patch;
 mod pixels;

@@ -18,7 +18,7 @@ pub(super) fn empty_film(size: (u32, u32), window: Window, channels: &[Channel])
         Get::U32(get) => PlaneData::U32(vec![get(&Sample::MISS); area]),
     };
     let planes = channels.iter().map(|channel| Plane { name: channel.name.to_string(), data: data(channel) }).collect();
-    Film { width: size.0, height: size.1, window, planes }
+    Film { width: size.0, height: size.1, window, planes, texts: Vec::new() }
 }
 
 /// What the planes get from a batch of pixels: worked out before the film is locked, which is then a matter of copying.

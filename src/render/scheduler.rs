@@ -7,6 +7,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::aov::Channel;
+use super::mattes::{Coverage, Mattes};
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{Patch, channels, empty_film};
 use super::pixels::{add, add_light, alone, begin, mean, variance};
@@ -86,12 +87,20 @@ pub fn render_with<S: Real>(
     let shader =
         Shader::new(world, description, engine, headlight(camera), options.settings()).with_rt(description, camera);
     let channels = channels(&options.aovs);
-    let film = Mutex::new(empty_film((options.width, options.height), window, &channels));
-    let job = Job { shader, camera, tiling, rect: rect_of(window), window, channels, options, progress, start };
+    let mut film = empty_film((options.width, options.height), window, &channels);
+    let mattes = Mattes::new(world, description, &options.aovs, &mut film);
+    let film = Mutex::new(film);
+    let rect = rect_of(window);
+    let job = Job { shader, camera, tiling, rect, window, channels, mattes, options, progress, start };
     let tiles = tiling.tiles_in(job.rect);
     let paint = |sums: &mut Sums, pixels: &[(u32, u32)], patch: &mut Patch| {
         job.fill(patch, sums, pixels);
-        patch.paint(&mut locked(&film));
+        let mut film = locked(&film);
+        patch.paint(&mut film);
+        if let Some(mattes) = &job.mattes {
+            mattes.paint(&mut film, window, pixels, &sums.coverages, sums.count);
+        }
+        drop(film);
         progress.tile_done(tiles.len() as u64);
     };
     let tally = if options.is_adaptive() {
@@ -109,8 +118,12 @@ pub fn render_with<S: Real>(
         };
         tiles.par_iter().map_init(TileMemory::default, one_tile).reduce(Tally::default, Tally::plus)
     };
+    let mut film = film.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+    if let Some(mattes) = job.mattes {
+        mattes.finish(&mut film);
+    }
     Ok(RenderOutput {
-        film: film.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()),
+        film,
         rays: tally.rays,
         seconds: start.elapsed().as_secs_f64(),
         counters: tally.counters,
@@ -128,6 +141,7 @@ struct Job<'a, S: Real> {
     rect: PixelRect,
     window: Window,
     channels: Vec<Channel>,
+    mattes: Option<Mattes<'a>>,
     options: &'a RenderOptions,
     progress: &'a dyn Progress,
     start: Instant,
@@ -137,6 +151,8 @@ struct Job<'a, S: Real> {
 #[derive(Default)]
 struct Sums {
     pixels: Vec<Sample>,
+    /// What they met, if it is wanted.
+    coverages: Vec<Coverage>,
     /// Samples of each pixel so far.
     count: u32,
 }
@@ -144,6 +160,7 @@ struct Sums {
 impl Sums {
     fn start(&mut self) {
         self.pixels.clear();
+        self.coverages.iter_mut().for_each(Coverage::clear);
         self.count = 0;
     }
 
@@ -203,6 +220,9 @@ impl<S: Real> Job<'_, S> {
             let sub_pixel = self.options.sub_pixel(sample);
             fill_tile(self.camera, &self.tiling, tile, self.rect, sub_pixel, &mut memory.rays);
             self.shader.shade(&memory.rays, &memory.pixels, sample, &mut memory.work, &mut memory.samples);
+            if let Some(mattes) = &self.mattes {
+                mattes.count(&memory.samples, &mut sums.coverages);
+            }
             if sums.count == 0 {
                 std::mem::swap(&mut sums.pixels, &mut memory.samples);
                 sums.pixels.iter_mut().for_each(begin);

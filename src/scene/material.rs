@@ -25,6 +25,9 @@ pub struct Material {
     pub one_sided: bool,
     /// How light is scattered.
     pub scattering: Scattering,
+    /// Whether light that facets of rough metal or glass throw at each other is there, as it is in nature; without it,
+    /// as the models were published, rough surfaces are a little dark.
+    pub multiple_scattering: bool,
     /// Opacity, 0..1, as [`Self::alpha`] uses it.
     pub opacity: f64,
     /// What opacity means.
@@ -120,6 +123,8 @@ pub struct Textures {
     pub emission: Option<TextureRef>,
     /// Roughness (G) and metallic share (B).
     pub metallic_roughness: Option<TextureRef>,
+    /// Metallic share (R), where a file has a picture of its own for it.
+    pub metallic: Option<TextureRef>,
     /// Share of transmission (R).
     pub transmission: Option<TextureRef>,
     /// Normals in tangent space, 0.5 + 0.5 n.
@@ -167,6 +172,7 @@ impl Textures {
             &mut self.opacity,
             &mut self.emission,
             &mut self.metallic_roughness,
+            &mut self.metallic,
             &mut self.transmission,
             &mut self.normal,
             &mut self.occlusion,
@@ -184,6 +190,7 @@ impl Default for Material {
             emission: DVec3::ZERO,
             one_sided: false,
             scattering: Scattering::Matte,
+            multiple_scattering: true,
             opacity: 1.0,
             alpha: Alpha::Opaque,
             textures: Textures::default(),

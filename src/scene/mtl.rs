@@ -2,11 +2,11 @@
 //!
 //! Source: Alias|Wavefront, "MTL material format", 1995, and the PBR extension (Pr, Pm, norm) that exporters write
 //! (Clara.io, 2014). Read are `newmtl`, `Kd`, `Ks`, `Ke`, `Tf`, `Ns`, `Ni`, `d`, `Tr`, `illum`, `Pr`, `Pm`, and the
-//! maps `map_Kd`, `map_Ke`, `map_d`, `map_Bump` (or `bump`) and `norm` with their options -s, -o, -clamp and -bm;
+//! maps `map_Kd`, `map_Ke`, `map_d`, `map_Pr`, `map_Pm`, `map_Bump` (or `bump`) and `norm` with their options -s, -o, -clamp and -bm;
 //! keywords in any case. What the model cannot use is passed over and counted: ambient colours, spectral files, other
 //! maps.
 //!
-//! What a material becomes ([`Entry::material`]): with Pr or Pm the metallic-roughness model; with illum 6 or 7 solid
+//! What a material becomes ([`Entry::material`]): with Pr or Pm or a map of them the metallic-roughness model; with illum 6 or 7 solid
 //! glass of index Ni; with illum 3, 5 or 8 matte with a mirror of Ks; with a Ks above 0, unless illum is 0 or 1, a coat
 //! on a diffuse base; else matte. Ns becomes the roughness with the same width of highlight: alpha^2 = 2 / (Ns + 2)
 //! (B. Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007, section 5.1).
@@ -57,6 +57,10 @@ pub struct Entry {
     pub emission_map: Option<Box<Map>>,
     /// Opacity.
     pub opacity_map: Option<Box<Map>>,
+    /// Roughness.
+    pub roughness_map: Option<Box<Map>>,
+    /// Share of metal.
+    pub metallic_map: Option<Box<Map>>,
     /// Heights, or normals as many files have there.
     pub bump_map: Option<Box<Map>>,
     /// Normals.
@@ -92,9 +96,14 @@ impl Entry {
         let mut material = Material { name: self.name.clone(), diffuse, ..Material::default() };
         material.emission = self.emission.max(DVec3::ZERO);
         let is_glass = matches!(self.illumination, Some(6 | 7)) && self.opacity_map.is_none();
-        if self.roughness.is_some() || self.metallic.is_some() {
-            let roughness = self.roughness.unwrap_or_else(|| from_exponent(0.5)).clamp(0.0, 1.0);
-            let metallic = self.metallic.unwrap_or(0.0).clamp(0.0, 1.0);
+        let (is_rough_map, is_metal_map) = (self.roughness_map.is_some(), self.metallic_map.is_some());
+        if self.roughness.is_some() || self.metallic.is_some() || is_rough_map || is_metal_map {
+            // As above: a map alone, or with a factor of zero, is meant as it is.
+            let mapped = |factor: Option<f64>| factor.filter(|&x| x > 0.0).unwrap_or(1.0);
+            let plain = || self.roughness.unwrap_or_else(|| from_exponent(0.5));
+            let roughness = if is_rough_map { mapped(self.roughness) } else { plain() }.clamp(0.0, 1.0);
+            let metallic = if is_metal_map { mapped(self.metallic) } else { self.metallic.unwrap_or(0.0) };
+            let metallic = metallic.clamp(0.0, 1.0);
             let transmission = f64::from(u8::from(is_glass));
             material.scattering = Scattering::MetallicRoughness { metallic, roughness, ior, transmission };
         } else if is_glass {
@@ -167,6 +176,8 @@ impl<'a> Reader<'a> {
             b"map_kd" => self.map(keyword, |e, m| e.base_map = Some(Box::new(m))),
             b"map_ke" => self.map(keyword, |e, m| e.emission_map = Some(Box::new(m))),
             b"map_d" => self.map(keyword, |e, m| e.opacity_map = Some(Box::new(m))),
+            b"map_pr" => self.map(keyword, |e, m| e.roughness_map = Some(Box::new(m))),
+            b"map_pm" => self.map(keyword, |e, m| e.metallic_map = Some(Box::new(m))),
             b"map_bump" | b"bump" => self.map(keyword, |e, m| e.bump_map = Some(Box::new(m))),
             b"norm" | b"map_norm" => self.map(keyword, |e, m| e.normal_map = Some(Box::new(m))),
             _ => {

@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::glow::Glows;
+use super::path::Rough;
 use super::path::fresnel::dielectric_mean;
 use crate::scene::description::{Description, Material};
 use crate::scene::material::{Alpha, Scattering, TextureRef};
@@ -86,6 +88,9 @@ struct Ready {
 pub struct Looks<'a> {
     materials: Vec<(Material, Ready)>,
     textures: &'a [Arc<Texture>],
+    glows: Glows,
+    /// The rough surfaces that parameters number.
+    pub rough: Vec<Rough>,
     /// Whether some material lets rays pass by its opacity.
     pub has_holes: bool,
     /// Whether some material is a mixture.
@@ -97,14 +102,17 @@ pub struct Looks<'a> {
 impl<'a> Looks<'a> {
     /// Those of `description`; a number beyond the list means the default material.
     pub fn new(description: &'a Description) -> Self {
-        let mut materials: Vec<_> = description.materials.iter().map(|m| (m.clone(), Ready::new(m))).collect();
+        let mut rough = Vec::new();
+        let ready = |m: &Material| (m.clone(), Ready::new(m, &mut rough));
+        let mut materials: Vec<_> = description.materials.iter().map(ready).collect();
         if materials.is_empty() {
-            materials.push((Material::default(), Ready::new(&Material::default())));
+            materials.push((Material::default(), Ready::new(&Material::default(), &mut rough)));
         }
+        let glows = Glows::new(&materials.iter().map(|(material, _)| material).collect::<Vec<_>>());
         let has_holes = materials.iter().any(|(m, _)| m.alpha != Alpha::Opaque);
         let has_mixtures = materials.iter().any(|(m, _)| matches!(m.scattering, Scattering::Mix { .. }));
         let has_glass = materials.iter().any(|(m, _)| lets_pass(m));
-        Self { materials, textures: &description.textures, has_holes, has_mixtures, has_glass }
+        Self { materials, textures: &description.textures, glows, rough, has_holes, has_mixtures, has_glass }
     }
 
     /// Material number `id`.
@@ -166,6 +174,9 @@ impl<'a> Looks<'a> {
                         look.param[1] = (roughness * f64::from(g)).powi(2).clamp(LEAST_WIDTH, 1.0);
                     }
                 }
+                if let Some([r, ..]) = self.sample(textures.metallic.as_ref(), surface) {
+                    look.param[0] *= f64::from(r);
+                }
                 if let Some([r, ..]) = self.sample(textures.transmission.as_ref(), surface) {
                     look.param[3] *= f64::from(r);
                 }
@@ -174,23 +185,43 @@ impl<'a> Looks<'a> {
         look
     }
 
-    /// Radiance that material `id` emits at `surface` to the side of its normal (`from_front`) or the other one.
+    /// Radiance that material `id` emits at `surface` to the side of its normal (`from_front`) or the other one;
+    /// mixtures emit what their materials do, by their shares.
+    #[inline]
     pub fn emission(&self, id: u32, surface: &Surface, from_front: bool) -> DVec3 {
-        self.emission_at(id, from_front, |set| surface.uv(set))
+        self.emission_by(id, from_front, |texture| self.sample(texture, surface))
     }
 
-    /// The same of a surface without texture coordinates, whose opacity is counted in.
-    pub fn even_emission(&self, id: u32, from_front: bool) -> DVec3 {
-        self.emission_at(id, from_front, |_| [0.0; 2]) * self.opacity_at(id, |_| [0.0; 2])
+    /// The same without textures.
+    pub fn plain_emission(&self, id: u32, from_front: bool) -> DVec3 {
+        self.emission_by(id, from_front, |_| None)
     }
 
-    fn emission_at(&self, id: u32, from_front: bool, uv: impl Fn(u8) -> [f64; 2]) -> DVec3 {
-        let material = self.material(id);
-        if material.emission == DVec3::ZERO || material.one_sided && !from_front {
-            return DVec3::ZERO;
+    #[inline]
+    fn emission_by(
+        &self,
+        id: u32,
+        from_front: bool,
+        sample: impl Fn(Option<&TextureRef>) -> Option<[f32; 4]>,
+    ) -> DVec3 {
+        let mut sum = DVec3::ZERO;
+        for &(id, share) in self.glows.of(id) {
+            let material = self.material(id);
+            if from_front || !material.one_sided {
+                sum += material.emission * share * sample(material.textures.emission.as_ref()).map_or(DVec3::ONE, rgb);
+            }
         }
-        let texture = self.sample_at(material.textures.emission.as_ref(), uv);
-        material.emission * texture.map_or(DVec3::ONE, rgb)
+        sum
+    }
+
+    /// Whether what material `id` emits differs from point to point.
+    pub fn has_pictured_emission(&self, id: u32) -> bool {
+        self.glows.of(id).iter().any(|&(id, _)| self.material(id).textures.emission.is_some())
+    }
+
+    /// Whether material `id` emits anything.
+    pub fn shines(&self, id: u32) -> bool {
+        !self.glows.of(id).is_empty()
     }
 
     /// Whether material `id` may let rays pass.
@@ -212,14 +243,10 @@ impl<'a> Looks<'a> {
 
     /// Share of light that material `id` stops at `surface`.
     pub fn opacity(&self, id: u32, surface: &Surface) -> f64 {
-        self.opacity_at(id, |set| surface.uv(set))
-    }
-
-    fn opacity_at(&self, id: u32, uv: impl Fn(u8) -> [f64; 2]) -> f64 {
         let material = self.material(id);
         let opacity = || {
-            let base = self.sample_at(material.textures.base.as_ref(), &uv).map_or(1.0, |c| f64::from(c[3]));
-            let own = self.sample_at(material.textures.opacity.as_ref(), &uv).map_or(1.0, |c| f64::from(c[0]));
+            let base = self.sample(material.textures.base.as_ref(), surface).map_or(1.0, |c| f64::from(c[3]));
+            let own = self.sample(material.textures.opacity.as_ref(), surface).map_or(1.0, |c| f64::from(c[0]));
             (material.opacity * base * own).clamp(0.0, 1.0)
         };
         match material.alpha {
@@ -233,7 +260,8 @@ impl<'a> Looks<'a> {
     pub fn bumped(&self, id: u32, surface: &Surface) -> DVec3 {
         let textures = &self.material(id).textures;
         let Some(map) = &textures.normal else { return surface.ns };
-        let (Some(tangents), Some([x, y, z, _])) = (surface.tangents(map.uv_set), self.sample(Some(map), surface))
+        let (Some(tangents), Some([x, y, z, _])) =
+            (surface.tangents(map.uv_set, &map.transform.matrix2), self.sample(Some(map), surface))
         else {
             return surface.ns;
         };
@@ -244,13 +272,8 @@ impl<'a> Looks<'a> {
     }
 
     fn sample(&self, use_of: Option<&TextureRef>, surface: &Surface) -> Option<[f32; 4]> {
-        self.sample_at(use_of, |set| surface.uv(set))
-    }
-
-    /// Value of a texture at the coordinates that `uv` gives for their set.
-    fn sample_at(&self, use_of: Option<&TextureRef>, uv: impl Fn(u8) -> [f64; 2]) -> Option<[f32; 4]> {
         let r = use_of?;
-        Some(self.textures.get(r.texture as usize)?.sample(r, uv(r.uv_set)))
+        Some(self.textures.get(r.texture as usize)?.sample(r, surface.uv(r.uv_set)))
     }
 }
 
@@ -267,9 +290,9 @@ fn rgb(color: [f32; 4]) -> DVec3 {
 }
 
 impl Ready {
-    fn new(material: &Material) -> Self {
+    fn new(material: &Material, rough: &mut Vec<Rough>) -> Self {
         let t = &material.textures;
-        let is_textured = t.base.is_some() || t.metallic_roughness.is_some() || t.transmission.is_some();
+        let is_textured = [t.base, t.metallic_roughness, t.metallic, t.transmission].iter().any(Option::is_some);
         let is_even = !is_textured
             && t.normal.is_none()
             && t.occlusion.is_none()
@@ -280,15 +303,24 @@ impl Ready {
                 material.scattering,
                 Scattering::Matte | Scattering::Plastic { .. } | Scattering::MetallicRoughness { .. }
             );
-        Self { front: constant(material, true), back: constant(material, false), is_textured, is_even, is_uniform }
+        let (front, back) = (constant(material, true, rough), constant(material, false, rough));
+        Self { front, back, is_textured, is_even, is_uniform }
     }
 }
 
-/// What `material` scatters with where no texture changes it.
-fn constant(material: &Material, from_front: bool) -> Look {
+/// What `material` scatters with where no texture changes it; rough surfaces are added to the list `rough`.
+fn constant(material: &Material, from_front: bool, rough: &mut Vec<Rough>) -> Look {
     let base = material.diffuse;
     let mut param = [0.0; 7];
     let width = |roughness: f64| (roughness * roughness).clamp(0.0, 1.0);
+    let is_multiple = material.multiple_scattering;
+    let mut number = |surface: Rough| {
+        let known = rough.iter().position(|other| *other == surface);
+        known.unwrap_or_else(|| {
+            rough.push(surface);
+            rough.len() - 1
+        }) as f64
+    };
     let (model, base) = match material.scattering {
         Scattering::Matte | Scattering::Mix { .. } => {
             param[..3].copy_from_slice(&material.mirror.to_array());
@@ -297,15 +329,25 @@ fn constant(material: &Material, from_front: bool) -> Look {
         Scattering::Conductor { eta, k, roughness } => {
             param[..3].copy_from_slice(&eta.to_array());
             param[3..6].copy_from_slice(&k.to_array());
-            param[6] = width(roughness);
-            (if param[6] < SMOOTH { Model::SmoothConductor } else { Model::RoughConductor }, base)
+            let alpha = width(roughness);
+            if alpha < SMOOTH {
+                (Model::SmoothConductor, base)
+            } else {
+                param[6] = number(Rough::Metal { alpha, index: [eta.to_array(), k.to_array()], is_multiple });
+                (Model::RoughConductor, base)
+            }
         }
         Scattering::Dielectric { ior, roughness, tint } => {
             param[0] = if from_front { ior } else { 1.0 / ior };
             param[1] = width(roughness);
             // Facets without a change of the medium would bend light for no reason.
             let is_smooth = param[1] < SMOOTH || (ior - 1.0).abs() < 1e-6;
-            (if is_smooth { Model::SmoothDielectric } else { Model::RoughDielectric }, tint)
+            if is_smooth {
+                (Model::SmoothDielectric, tint)
+            } else {
+                param[2] = number(Rough::Glass { alpha: param[1], eta: param[0], is_multiple });
+                (Model::RoughDielectric, tint)
+            }
         }
         Scattering::ThinGlass { ior, tint } => {
             param[0] = ior;
@@ -315,7 +357,12 @@ fn constant(material: &Material, from_front: bool) -> Look {
             param[0] = ior;
             param[1] = dielectric_mean(1.0 / ior);
             param[2] = width(roughness);
-            (if param[2] < SMOOTH { Model::SmoothCoat } else { Model::RoughCoat }, base)
+            if param[2] < SMOOTH {
+                (Model::SmoothCoat, base)
+            } else {
+                param[3] = number(Rough::Coat { alpha: param[2], eta: ior });
+                (Model::RoughCoat, base)
+            }
         }
         Scattering::MetallicRoughness { metallic, roughness, ior, transmission } => {
             param[0] = metallic;

@@ -9,6 +9,7 @@ mod ambient_occlusion;
 mod bare;
 mod branches;
 mod classic;
+mod glow;
 mod integrator;
 mod lights;
 mod look;

@@ -113,6 +113,22 @@ pub fn cosine_mean(f: impl Fn(DVec3) -> f64) -> f64 {
     sum / f64::from(STEPS * (STEPS / 4))
 }
 
+/// Mean over the hemisphere, weighted by the cosine, of [`mirrored`].
+pub fn mirrored_mean(alpha: f64, kept: impl Fn(f64) -> f64) -> f64 {
+    const PARTS: u32 = 24;
+    let at = |i: u32| {
+        let z = ((f64::from(i) + 0.5) / f64::from(PARTS)).sqrt();
+        mirrored(DVec3::new((1.0 - z * z).sqrt(), 0.0, z), alpha, &kept)
+    };
+    (0..PARTS).map(at).sum::<f64>() / f64::from(PARTS)
+}
+
+/// Share of light lost by one facet that many give back, if they mirror the mean share `f` and perfect ones would give
+/// back the mean share `once`: f^2 E / (1 - f (1 - E)).
+pub fn repeated(f: f64, once: f64) -> f64 {
+    f * f * once / (1.0 - f * (1.0 - once))
+}
+
 /// Light from `from` to `out` by GGX facets that mirror all of it: f times the cosine of `from`.
 pub fn value(out: DVec3, from: DVec3, alpha: f64) -> f64 {
     let half = (out + from).normalize();

@@ -87,7 +87,9 @@ impl Brick {
 
 impl Stuff {
     fn material(&self, name: &str) -> Material {
-        let plain = Material { name: name.to_owned(), diffuse: DVec3::ZERO, ..Material::default() };
+        // Mitsuba's facets do not throw light at each other.
+        let plain = Material { diffuse: DVec3::ZERO, multiple_scattering: false, ..Material::default() };
+        let plain = Material { name: name.to_owned(), ..plain };
         let scattering = |scattering| Material { scattering, ..plain.clone() };
         match *self {
             Self::Matte { reflectance } => Material { diffuse: reflectance.into(), ..plain },

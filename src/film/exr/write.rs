@@ -12,7 +12,7 @@ use exr::prelude::{AnyChannel, AnyChannels, Blocks, Encoding, Image, Layer, Vec2
 
 use super::ImageInfo;
 use crate::error::{Error, Result};
-use crate::film::{Film, PlaneData, Window, write_atomically};
+use crate::film::{Film, PlaneData, write_atomically};
 
 /// Older programs accept longer names only in files that announce them, which the exr crate forgets for channels.
 const SHORT_NAME: usize = 31;
@@ -61,7 +61,7 @@ pub fn write(path: &Path, film: &Film, info: &ImageInfo, compression: Compressio
         line_order: LineOrder::Increasing,
     };
     let size = Vec2(film.window.width() as usize, film.window.height() as usize);
-    let layer = Layer::new(size, layer_attributes(film.window, info), encoding, AnyChannels::sort(channels));
+    let layer = Layer::new(size, layer_attributes(film, info), encoding, AnyChannels::sort(channels));
     let image = Image { attributes: image_attributes(bounds), layer_data: layer };
     let has_long_name = film.planes.iter().any(|plane| plane.name.chars().count() > SHORT_NAME);
     write_atomically(path, |w| {
@@ -101,7 +101,8 @@ fn image_attributes(display: IntegerBounds) -> ImageAttributes {
     attributes
 }
 
-fn layer_attributes(window: Window, info: &ImageInfo) -> LayerAttributes {
+fn layer_attributes(film: &Film, info: &ImageInfo) -> LayerAttributes {
+    let window = film.window;
     let mut attributes = LayerAttributes {
         // Inside the display window, whose size was checked against EXR's limit.
         layer_position: Vec2(window.x0 as i32, window.y0 as i32),
@@ -123,6 +124,9 @@ fn layer_attributes(window: Window, info: &ImageInfo) -> LayerAttributes {
         ("rays", AttributeValue::F64(info.rays as f64)),
     ] {
         attributes.other.insert(text(&format!("lanecast/{name}")), value);
+    }
+    for (name, value) in &film.texts {
+        attributes.other.insert(text(name), AttributeValue::Text(text(value)));
     }
     attributes
 }

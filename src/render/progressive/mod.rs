@@ -24,7 +24,7 @@ use rayon::prelude::*;
 pub use framebuffer::Framebuffer;
 pub use steps::{LARGEST_BLOCK, Step};
 
-use super::aov::Channel;
+use super::aov::{Aov, Channel};
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{Patch, channels, empty_film};
 use super::pixels::{begin, mean};
@@ -148,6 +148,9 @@ impl<'a, S: Real> Progressive<'a, S> {
         if options.is_adaptive() {
             let what = "pictures by blocks have a fixed number of samples: no time limit and no noise level";
             return Err(Error::Usage(what.into()));
+        }
+        if options.aovs.contains(&Aov::Cryptomatte) {
+            return Err(Error::Usage("cryptomattes are not made by blocks: leave --preview and --blocks out".into()));
         }
         let settings = options.settings();
         let start = if settings.cost || !engine.is_exact() { 1 } else { start };

@@ -60,7 +60,7 @@ pub fn material<'n, 'a>(
                 }
                 match kind {
                     "mix" => mix = Some(mixed(scope, child, id)?),
-                    _ => material.scattering = scattering(scope, child, kind)?,
+                    _ => (material.scattering, material.multiple_scattering) = scattering(scope, child, kind)?,
                 }
             }
             _ => {
@@ -85,23 +85,25 @@ pub fn material<'n, 'a>(
     Ok((material, mix))
 }
 
-fn scattering(scope: &Scope<'_>, node: &Node<'_>, kind: &str) -> Result<Scattering> {
+/// How `node` of `kind` scatters, and whether facets throw light at each other.
+fn scattering(scope: &Scope<'_>, node: &Node<'_>, kind: &str) -> Result<(Scattering, bool)> {
     let allowed: &[&str] = match kind {
-        "conductor" => &["eta", "k", "roughness"],
-        "dielectric" => &["ior", "roughness", "tint"],
+        "conductor" => &["eta", "k", "roughness", "single-scattering"],
+        "dielectric" => &["ior", "roughness", "tint", "single-scattering"],
         "thin-glass" => &["ior", "tint"],
         "plastic" => &["ior", "roughness"],
         _ => &["metallic", "roughness", "ior", "transmission"],
     };
     let fields = Fields::collect(scope, node, allowed, NO_REST)?;
+    let is_multiple = !fields.flag("single-scattering")?;
     if kind == "conductor" {
         let (eta, k) = conductor(scope, &fields)?;
-        return Ok(Scattering::Conductor { eta, k, roughness: fields.share("roughness", 0.0)? });
+        return Ok((Scattering::Conductor { eta, k, roughness: fields.share("roughness", 0.0)? }, is_multiple));
     }
     fields.no_arguments()?;
     let ior = fields.positive("ior", IOR)?;
     let tint = || Ok::<_, crate::error::Error>(fields.colour("tint", 1.0)?.unwrap_or(DVec3::ONE));
-    Ok(match kind {
+    let model = match kind {
         "dielectric" => Scattering::Dielectric { ior, roughness: fields.share("roughness", 0.0)?, tint: tint()? },
         "thin-glass" => Scattering::ThinGlass { ior, tint: tint()? },
         "plastic" => Scattering::Plastic { ior, roughness: fields.share("roughness", 0.0)? },
@@ -111,7 +113,8 @@ fn scattering(scope: &Scope<'_>, node: &Node<'_>, kind: &str) -> Result<Scatteri
             ior,
             transmission: fields.share("transmission", 0.0)?,
         },
-    })
+    };
+    Ok((model, is_multiple))
 }
 
 /// `conductor gold`, or `conductor { eta 0.2 0.9 1.1; k 3.9 2.4 2.1 }`.

@@ -82,6 +82,8 @@ enum Use {
     Colour,
     Opacity,
     Normals,
+    Roughness,
+    Metallic,
     /// Heights times this number (its bits), or normals.
     Bump(u64),
 }
@@ -134,6 +136,8 @@ impl Reader<'_> {
         looks.base = texture(&entry.base_map, Use::Colour);
         looks.emission = texture(&entry.emission_map, Use::Colour);
         looks.opacity = texture(&entry.opacity_map, Use::Opacity);
+        looks.metallic_roughness = texture(&entry.roughness_map, Use::Roughness);
+        looks.metallic = texture(&entry.metallic_map, Use::Metallic);
         looks.normal = texture(&entry.normal_map, Use::Normals);
         if let (None, Some(bump)) = (looks.normal, &entry.bump_map) {
             looks.normal = texture(&entry.bump_map, Use::Bump(bump.multiplier.to_bits()));
@@ -167,8 +171,9 @@ impl Reader<'_> {
         let mut is_relief = Vec::with_capacity(decoded.len());
         for ((texture, digest), usage) in decoded.into_iter().zip(images.uses) {
             let (texture, relief) = match usage {
-                Use::Colour | Use::Normals => (texture, false),
+                Use::Colour | Use::Normals | Use::Metallic => (texture, false),
                 Use::Opacity => (opacity(texture), false),
+                Use::Roughness => (roughness(texture), false),
                 Use::Bump(bits) if heights::is_heights(&texture) => {
                     (heights::normals(&texture, f64::from_bits(bits)), true)
                 }
@@ -206,6 +211,19 @@ impl Images {
         self.known.insert((path, usage), id);
         id
     }
+}
+
+/// A grey picture as roughness alone, in glTF's channels: green, with no say on metal in blue.
+fn roughness(mut texture: Texture) -> Texture {
+    fn from_grey<T: Copy>(texels: &mut [[T; 4]], full: T) {
+        texels.iter_mut().for_each(|t| *t = [full, t[0], full, full]);
+    }
+    match &mut texture.texels {
+        Texels::Srgb8(t) | Texels::Linear8(t) => from_grey(t, u8::MAX),
+        Texels::Linear16(t) => from_grey(t, u16::MAX),
+        Texels::Float(t) => from_grey(t, 1.0),
+    }
+    texture
 }
 
 /// A picture as opacity: of one with transparent texels its alpha counts, of others their grey.

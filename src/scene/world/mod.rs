@@ -10,6 +10,7 @@ mod runs;
 mod solids;
 mod successor;
 mod surface;
+mod uv;
 
 use glam::DVec3;
 

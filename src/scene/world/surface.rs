@@ -1,13 +1,15 @@
 //! What shading needs of a hit, in f64, from the description's own numbers.
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DMat2, DVec2, DVec3};
 
 use super::runs::{self, Place};
-use super::{World, solids};
+use super::{World, solids, uv};
 use crate::lanes::Real;
 use crate::math::normal_to_world;
 use crate::scene::assembly::{Part, PartKind};
+use crate::scene::description::Shape;
 use crate::scene::mesh::Mesh;
+use crate::scene::solids::Solid;
 use crate::scene::solids::flat::FlatLeaf;
 
 /// A hit point with what shading needs, f64, world space.
@@ -25,7 +27,17 @@ pub struct Surface<'a> {
     pub magnitude: DVec3,
     /// Index into the description's materials.
     pub material: u32,
-    triangle: Option<OnTriangle<'a>>,
+    on: On<'a>,
+}
+
+/// What the point is on, for texture coordinates.
+#[derive(Clone, Copy, Debug)]
+enum On<'a> {
+    Triangle(OnTriangle<'a>),
+    /// A point of a face, in the space of the shape.
+    Shape(Shape, DVec3, u32),
+    /// The same of a leaf of a tree.
+    Solid(&'a Solid, DVec3, u32),
 }
 
 /// See [`World::bare_triangle`].
@@ -80,22 +92,25 @@ impl<S: Real> World<S> {
                 };
                 let on = OnTriangle { mesh, index, weights, to_world };
                 let ns = on.shading_normal().map_or(ng, |ns| if ns.dot(ng) < 0.0 { -ns } else { ns });
-                Surface { position, ng, ns, magnitude, material, triangle: Some(on) }
+                Surface { position, ng, ns, magnitude, material, on: On::Triangle(on) }
             }
             PartKind::Shape(shape) => {
                 let position = org + dir * t;
                 let place = kept.copied().unwrap_or_else(|| Place::new(&to_world));
-                let ng = place.normal(solids::shape_normal(shape, place.local(position), u as u32));
-                Surface { position, ng, ns: ng, magnitude: placed(shape_magnitude(part)), material, triangle: None }
+                let (local, face) = (place.local(position), u as u32);
+                let ng = place.normal(solids::shape_normal(shape, local, face));
+                let on = On::Shape(*shape, local, face);
+                Surface { position, ng, ns: ng, magnitude: placed(shape_magnitude(part)), material, on }
             }
             PartKind::Solids(tree) => {
                 let leaf = &tree.leaves[(prim - part.first_prim) as usize];
                 let position = org + dir * t;
                 let magnitude = placed(leaf_magnitude(part, leaf));
                 let place = kept.copied().unwrap_or_else(|| Place::new(&(to_world * leaf.to_tree)));
-                let outward = place.normal(solids::solid_normal(&leaf.solid, place.local(position), u as u32));
+                let (local, face) = (place.local(position), u as u32);
+                let outward = place.normal(solids::solid_normal(&leaf.solid, local, face));
                 let ng = if v > 0.5 { -outward } else { outward };
-                Surface { position, ng, ns: ng, magnitude, material, triangle: None }
+                Surface { position, ng, ns: ng, magnitude, material, on: On::Solid(&leaf.solid, local, face) }
             }
         }
     }
@@ -170,23 +185,41 @@ impl<S: Real> World<S> {
 }
 
 impl Surface<'_> {
-    /// Texture coordinates of set 0 or 1; (0, 0) where there are none.
+    /// Texture coordinates of set 0 or 1, v down; (0, 0) where a mesh has none. Shapes and the leaves of solids have
+    /// those of their form in both sets.
     pub fn uv(&self, set: u8) -> [f64; 2] {
-        let Some(on) = &self.triangle else { return [0.0; 2] };
+        let down = |[u, v]: [f64; 2]| [u, 1.0 - v];
+        let on = match self.on {
+            On::Triangle(ref on) => on,
+            On::Shape(shape, point, face) => {
+                return down(uv::of_shape(&shape, point, solids::shape_normal(&shape, point, face)));
+            }
+            On::Solid(solid, point, face) => {
+                return down(uv::of_solid(solid, point, solids::solid_normal(solid, point, face), face));
+            }
+        };
         on.uvs(set).map_or([0.0; 2], |uvs| {
             let [a, b, c] = on.weights;
             (uvs[0] * a + uvs[1] * b + uvs[2] * c).to_array()
         })
     }
 
-    /// Unit directions in which the texture coordinates u and v of set 0 or 1 grow, perpendicular to the shading
-    /// normal, as normal maps want them: by the mesh's tangents, or from positions and coordinates. `None` without
-    /// either.
-    pub fn tangents(&self, set: u8) -> Option<[DVec3; 2]> {
-        let on = self.triangle.as_ref()?;
+    /// Unit directions to the right and up in a picture, perpendicular to the shading normal, as normal maps want them;
+    /// `to_picture` takes the texture coordinates of set 0 or 1 to the picture's. By the mesh's tangents, or from
+    /// positions and coordinates; `None` without either, as on shapes.
+    pub fn tangents(&self, set: u8, to_picture: &DMat2) -> Option<[DVec3; 2]> {
+        let On::Triangle(on) = &self.on else { return None };
         let (along, sign) = on.tangent().or_else(|| on.tangent_by_uv(set))?;
         let tangent = (along - self.ns * self.ns.dot(along)).try_normalize()?;
-        Some([tangent, self.ns.cross(tangent) * sign])
+        let bitangent = self.ns.cross(tangent) * sign;
+        let determinant = to_picture.determinant();
+        if *to_picture == DMat2::IDENTITY || determinant == 0.0 || !determinant.is_finite() {
+            return Some([tangent, bitangent]);
+        }
+        // What one step to the right in the picture is in coordinates, whose v points down.
+        let step = DVec2::new(to_picture.y_axis.y, -to_picture.x_axis.y) * determinant.signum();
+        let turned = (tangent * step.x - bitangent * step.y).try_normalize()?;
+        Some([turned, self.ns.cross(turned) * (sign * determinant.signum())])
     }
 }
 

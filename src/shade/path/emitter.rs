@@ -43,6 +43,8 @@ pub enum Emitter {
         area: f64,
         /// Material number.
         material: u32,
+        /// Primitive and instance.
+        ids: [u32; 2],
     },
     /// An emitting sphere.
     Sphere {
@@ -52,6 +54,8 @@ pub enum Emitter {
         radius: f64,
         /// Material number.
         material: u32,
+        /// Primitive and instance.
+        ids: [u32; 2],
     },
     /// An emitting surface that paths find only by chance.
     Unaimed,
@@ -86,11 +90,18 @@ impl Emitter {
     /// What packets need of a triangle of even radiance.
     pub fn flat(&self, looks: &Looks<'_>) -> Option<Flat> {
         let Self::Triangle { corner, edges, normal, area, material, .. } = *self else { return None };
-        if looks.material(material).textures.emission.is_some() || looks.is_holed(material) {
+        if looks.has_pictured_emission(material) || looks.is_holed(material) {
             return None;
         }
         let mut numbers = [0.0; 19];
-        let vectors = [corner, edges[0], edges[1], normal, plain(looks, material, true), plain(looks, material, false)];
+        let vectors = [
+            corner,
+            edges[0],
+            edges[1],
+            normal,
+            looks.plain_emission(material, true),
+            looks.plain_emission(material, false),
+        ];
         for (to, from) in numbers.iter_mut().zip(vectors.iter().flat_map(|v| v.to_array()).chain([area])) {
             *to = from;
         }
@@ -107,16 +118,16 @@ impl Emitter {
     }
 
     /// The image of the unit disc.
-    pub fn disc(to_world: &DAffine3, material: u32) -> Self {
+    pub fn disc(to_world: &DAffine3, material: u32, ids: [u32; 2]) -> Self {
         let axes = [to_world.matrix3.x_axis, to_world.matrix3.y_axis];
         let cross = axes[0].cross(axes[1]);
         let mirrored = to_world.matrix3.determinant().signum();
         let normal = cross.normalize_or_zero() * mirrored;
-        Self::Disc { centre: to_world.translation, axes, normal, area: PI * cross.length(), material }
+        Self::Disc { centre: to_world.translation, axes, normal, area: PI * cross.length(), material, ids }
     }
 
     /// The image of the unit sphere, if that is a sphere.
-    pub fn sphere(to_world: &DAffine3, material: u32) -> Self {
+    pub fn sphere(to_world: &DAffine3, material: u32, ids: [u32; 2]) -> Self {
         let m = to_world.matrix3;
         let radius = m.x_axis.length();
         let alike = |x: f64| (x - radius).abs() <= 1e-9 * radius;
@@ -124,7 +135,7 @@ impl Emitter {
         let is_round = alike(m.y_axis.length()) && alike(m.z_axis.length());
         let is_right = right(m.x_axis.dot(m.y_axis)) && right(m.y_axis.dot(m.z_axis)) && right(m.z_axis.dot(m.x_axis));
         if is_round && is_right && radius > 0.0 {
-            Self::Sphere { centre: to_world.translation, radius, material }
+            Self::Sphere { centre: to_world.translation, radius, material, ids }
         } else {
             Self::Unaimed
         }
@@ -134,8 +145,7 @@ impl Emitter {
     pub fn power(&self, radius: f64, looks: &Looks<'_>) -> f64 {
         let mean = |c: DVec3| c.element_sum() / 3.0;
         let surface = |area: f64, material: u32| {
-            let material = looks.material(material);
-            mean(material.emission) * area * PI * if material.one_sided { 1.0 } else { 2.0 }
+            mean(looks.plain_emission(material, true) + looks.plain_emission(material, false)) * area * PI
         };
         match *self {
             Self::Light(Light::Point { intensity, .. }) => mean(intensity) * 4.0 * PI,
@@ -148,7 +158,7 @@ impl Emitter {
             Self::Triangle { area, material, .. } | Self::Disc { area, material, .. } => surface(area, material),
             // Only its outside shines into the scene.
             Self::Sphere { radius, material, .. } => {
-                mean(looks.material(material).emission) * 4.0 * PI * PI * radius * radius
+                mean(looks.plain_emission(material, true)) * 4.0 * PI * PI * radius * radius
             }
             Self::Unaimed => 0.0,
         }
@@ -163,25 +173,22 @@ impl Emitter {
                 let target = corner + edges[0] * b + edges[1] * c;
                 let mut aim = planar(from, target, normal, area)?;
                 let front = normal.dot(aim.dir) < 0.0;
-                let own = looks.material(material);
-                aim.radiance = if own.textures.emission.is_some() || looks.is_holed(material) {
-                    let surface = world.surface(target, DVec3::ZERO, 0.0, b, c, ids[0], ids[1]);
-                    looks.emission(material, &surface, front) * looks.opacity(material, &surface)
-                } else {
-                    plain(looks, material, front)
-                };
+                aim.radiance = radiance(looks, world, material, (target, [b, c]), front, ids);
                 Some(aim)
             }
-            Self::Disc { centre, axes, normal, area, material } => {
+            Self::Disc { centre, axes, normal, area, material, ids } => {
                 let radius = place[0].sqrt();
                 let (sin, cos) = (TAU * place[1]).sin_cos();
-                let mut aim = planar(from, centre + axes[0] * (radius * cos) + axes[1] * (radius * sin), normal, area)?;
-                aim.radiance = looks.even_emission(material, normal.dot(aim.dir) < 0.0);
+                let target = centre + axes[0] * (radius * cos) + axes[1] * (radius * sin);
+                let mut aim = planar(from, target, normal, area)?;
+                let front = normal.dot(aim.dir) < 0.0;
+                aim.radiance = radiance(looks, world, material, (target, [0.0; 2]), front, ids);
                 Some(aim)
             }
-            Self::Sphere { centre, radius, material } => {
+            Self::Sphere { centre, radius, material, ids } => {
                 let mut aim = aim_at_sphere(from, centre, radius, place)?;
-                aim.radiance = looks.even_emission(material, (aim.target - centre).dot(aim.dir) < 0.0);
+                let front = (aim.target - centre).dot(aim.dir) < 0.0;
+                aim.radiance = radiance(looks, world, material, (aim.target, [0.0; 2]), front, ids);
                 Some(aim)
             }
             Self::Unaimed => None,
@@ -219,9 +226,20 @@ impl Emitter {
     }
 }
 
-fn plain(looks: &Looks<'_>, material: u32, front: bool) -> DVec3 {
-    let material = looks.material(material);
-    if material.one_sided && !front { DVec3::ZERO } else { material.emission }
+/// What `material` emits at a place (with the weights of a triangle's corners) of primitive and instance `ids`.
+fn radiance<S: Real>(
+    looks: &Looks<'_>,
+    world: &World<S>,
+    material: u32,
+    (target, [b, c]): (DVec3, [f64; 2]),
+    front: bool,
+    ids: [u32; 2],
+) -> DVec3 {
+    if !looks.has_pictured_emission(material) && !looks.is_holed(material) {
+        return looks.plain_emission(material, front);
+    }
+    let surface = world.surface(target, DVec3::ZERO, 0.0, b, c, ids[0], ids[1]);
+    looks.emission(material, &surface, front) * looks.opacity(material, &surface)
 }
 
 /// Aim at `target` on a flat surface of `area`, without radiance.
@@ -326,7 +344,7 @@ mod tests {
             assert!(((aim.target - centre).length() - radius).abs() < 1e-6, "{k}");
             let normal = (aim.target - centre) / radius;
             assert!(normal.dot(aim.dir) < 1e-6);
-            let sphere = Emitter::Sphere { centre, radius, material: 0 };
+            let sphere = Emitter::Sphere { centre, radius, material: 0, ids: [0; 2] };
             assert!((sphere.pdf(from, aim.target, normal) / aim.pdf - 1.0).abs() < 1e-9);
         }
         let sin2 = radius * radius / (centre - from).length_squared();

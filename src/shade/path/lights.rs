@@ -144,10 +144,7 @@ impl<'a> Lights<'a> {
 /// The emitting runs of each object, where each placement's primitives begin in the list, and the list.
 fn surfaces<S: Real>(world: &World<S>, looks: &Looks<'_>) -> (Vec<Vec<Run>>, Vec<u32>, Vec<Emitter>) {
     let assembly = &world.assembly;
-    let emits = |object: usize, prim: u32| {
-        let id = world.material(object as u32, prim);
-        looks.material(id).emission != DVec3::ZERO
-    };
+    let emits = |object: usize, prim: u32| looks.shines(world.material(object as u32, prim));
     let runs: Vec<Vec<Run>> = (0..assembly.objects.len())
         .map(|object| {
             let mut list: Vec<Run> = Vec::new();
@@ -190,8 +187,8 @@ fn surface(part: &Part, prim: u32, inst: u32, material: u32, to_world: &glam::DA
         PartKind::Mesh(mesh) => {
             Emitter::triangle(to_world, mesh.corners((prim - part.first_prim) as usize), material, prim, inst)
         }
-        PartKind::Shape(Shape::Sphere) => Emitter::sphere(to_world, material),
-        PartKind::Shape(Shape::Disc) => Emitter::disc(to_world, material),
+        PartKind::Shape(Shape::Sphere) => Emitter::sphere(to_world, material, [prim, inst]),
+        PartKind::Shape(Shape::Disc) => Emitter::disc(to_world, material, [prim, inst]),
         _ => Emitter::Unaimed,
     }
 }

@@ -26,8 +26,10 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+pub(super) use self::bsdf::facets::Rough;
 pub(super) use self::bsdf::fresnel;
 
+use self::bsdf::facets::FacetsList;
 use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
 };
@@ -59,6 +61,7 @@ pub(super) struct Paths<'a, S: Real> {
     engine: &'a dyn Engine<S>,
     looks: Arc<Looks<'a>>,
     lights: Lights<'a>,
+    facets: FacetsList,
     /// Scatterings of a path at most.
     depth: u32,
     seed: u64,
@@ -107,10 +110,11 @@ impl<'a, S: Real> Paths<'a, S> {
         settings: &Settings,
     ) -> Self {
         let lights = Lights::new(world, description, &looks);
+        let facets = FacetsList::new(&looks.rough);
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
         let Settings { depth, seed, first_hits, .. } = *settings;
         let (has_facets, bare) = (world.has_facets(), BareTriangles::new(world, &looks, settings.rays));
-        Self { world, engine, looks, lights, depth, seed, first_hits, shadow_end, has_facets, bare }
+        Self { world, engine, looks, lights, facets, depth, seed, first_hits, shadow_end, has_facets, bare }
     }
 
     /// The radiance along each ray of the primary batch `rays` into `out`, which holds misses; see

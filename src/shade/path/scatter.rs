@@ -131,8 +131,8 @@ fn at<S: Copy>(columns: &[Column<S>; 3], lane: usize) -> [S; 3] {
 
 impl<S: Real> Paths<'_, S> {
     /// Scatters at all `points`: rays into `next`, shadow rays into `shadows`.
-    pub(super) fn scatter<B: Bsdf<S::Wide>>(
-        &self,
+    pub(super) fn scatter<'t, B: Bsdf<'t, S::Wide>>(
+        &'t self,
         points: &Points<S>,
         chances: &Chances<'_>,
         next: &mut Wave<S>,
@@ -143,7 +143,7 @@ impl<S: Real> Paths<'_, S> {
             let path = &points.path[first..points.len().min(first + width)];
             let numbers = chances.numbers::<S>(path);
             let packet = Packet::<S::Wide>::load(points, first);
-            let bsdf = B::load(points, first);
+            let bsdf = B::load(points, first, &self.facets);
             if !B::SMOOTH && !self.lights.is_empty() {
                 self.aim(&packet, &bsdf, path, &numbers, shadows);
             }
@@ -153,7 +153,7 @@ impl<S: Real> Paths<'_, S> {
 
     /// One shadow ray for each point of the packet that a light may reach.
     #[inline(always)]
-    fn aim<B: Bsdf<S::Wide>>(
+    fn aim<'t, B: Bsdf<'t, S::Wide>>(
         &self,
         packet: &Packet<S::Wide>,
         bsdf: &B,
@@ -292,7 +292,7 @@ fn those(mask: impl LaneMask, path: &[u32]) -> Chosen {
 
 /// The next ray of each path of the packet that goes on.
 #[inline(always)]
-fn go_on<S: Real, B: Bsdf<S::Wide>>(
+fn go_on<'t, S: Real, B: Bsdf<'t, S::Wide>>(
     packet: &Packet<S::Wide>,
     bsdf: &B,
     path: &[u32],

@@ -2,11 +2,14 @@
 //!
 //! Source: W. Jakob's *Mitsuba* describes the model as `plastic` with `nonlinear`: what enters, (1 - F), is reflected
 //! by the base, and of what reaches the coat from inside a mean share F_i comes back to the base, which gives
-//! base / (1 - base F_i).
+//! base / (1 - base F_i). With a rough coat the albedo E of its facets stands for F, and the base is weighted by 1 - E of
+//! both directions over the mean of it, as C. Kelemen and L. Szirmay-Kalos do (*A Microfacet Based Coupled
+//! Specular-Matte BRDF Model with Importance Sampling*, 2001).
 
 use std::f64::consts::FRAC_1_PI;
 
 use super::conductor::reflected;
+use super::facets::{FacetsList, PacketFacets};
 use super::ggx::Ggx;
 use super::matte::infinity;
 use super::warp::cosine;
@@ -51,11 +54,11 @@ impl<V: Lanes> Base<V> {
 /// With a smooth coat.
 pub struct SmoothCoat<V>(Base<V>);
 
-impl<V: Lanes> Bsdf<V> for SmoothCoat<V> {
+impl<V: Lanes> Bsdf<'_, V> for SmoothCoat<V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
+    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
         Self(Base::load(points, first))
     }
 
@@ -84,18 +87,42 @@ impl<V: Lanes> Bsdf<V> for SmoothCoat<V> {
     }
 }
 
-/// With a coat of facets.
-pub struct RoughCoat<V> {
-    base: Base<V>,
+/// With a coat of facets: what it does not mirror at once the base gets, so nothing is lost.
+pub struct RoughCoat<'t, V> {
+    /// Share of what the base gets that comes back, over the mean of what it gets.
+    color: Lanes3<V>,
+    /// Brightness of that share.
+    share: V,
+    eta: V,
     ggx: Ggx<V>,
+    facets: PacketFacets<'t, V>,
 }
 
-impl<V: Lanes> Bsdf<V> for RoughCoat<V> {
+impl<V: Lanes> RoughCoat<'_, V> {
+    /// Chance of the coat's reflection when the base gets the share `under`.
+    #[inline(always)]
+    fn coat_chance(&self, under: V) -> V {
+        let coat = V::constant(1.0) - under;
+        ratio(coat, self.share.mul_add(under, coat))
+    }
+}
+
+impl<'t, V: Lanes> Bsdf<'t, V> for RoughCoat<'t, V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
-        Self { base: Base::load(points, first), ggx: Ggx::new(points.scalar(PARAM + 2, first)) }
+    fn load(points: &Points<V::Scalar>, first: usize, facets: &'t FacetsList) -> Self {
+        let one = V::constant(1.0);
+        let facets = PacketFacets::<V>::load(facets, points.scalar(PARAM + 3, first));
+        let inside = facets.chance;
+        let share = points.vector::<V>(BASE, first).map(|c| c * (one - inside) / (one - c * inside));
+        Self {
+            color: share.map(|c| c * facets.down),
+            share: brightness(share),
+            eta: points.scalar(PARAM, first),
+            ggx: Ggx::new(points.scalar(PARAM + 2, first)),
+            facets,
+        }
     }
 
     #[inline(always)]
@@ -103,11 +130,13 @@ impl<V: Lanes> Bsdf<V> for RoughCoat<V> {
         let (one, four) = (V::constant(1.0), V::constant(4.0));
         let h = normalize(add(wo, wi));
         let cos = dot(wo, h);
-        let (f, _) = fresnel::dielectric(cos, self.base.eta);
+        let (f, _) = fresnel::dielectric(cos, self.eta);
         let coat = f * self.ggx.density(h) * self.ggx.masking_both(wo, wi) / (four * wo[2]);
         let lambert = wi[2] * V::constant(FRAC_1_PI);
-        let value = self.base.value(wo, wi).map(|c| c.mul_add(lambert, coat));
-        let chance = self.base.coat_chance(fresnel::dielectric(wo[2], self.base.eta).0);
+        let under = self.facets.lost(wo[2]);
+        let passed = under * self.facets.lost(wi[2]) * lambert;
+        let value = self.color.map(|c| c.mul_add(passed, coat));
+        let chance = self.coat_chance(under);
         let coat_pdf = self.ggx.visible_pdf(wo, h) / (four * cos);
         let pdf = chance * coat_pdf + (one - chance) * lambert;
         only(V::constant(0.0).cmp_lt(wi[2]), Value { value, pdf })
@@ -115,7 +144,7 @@ impl<V: Lanes> Bsdf<V> for RoughCoat<V> {
 
     #[inline(always)]
     fn sample(&self, wo: Lanes3<V>, place: [V; 2], choice: V) -> Sampled<V> {
-        let chance = self.base.coat_chance(fresnel::dielectric(wo[2], self.base.eta).0);
+        let chance = self.coat_chance(self.facets.lost(wo[2]));
         let (up, ..) = reflected(&self.ggx, wo, self.ggx.visible(wo, place));
         let wi = choose(choice.cmp_lt(chance), up, cosine(place));
         let found = self.eval(wo, wi);

@@ -1,9 +1,13 @@
 //! Metals, smooth and rough.
 
+use std::f64::consts::FRAC_1_PI;
+
+use super::facets::{FacetsList, PacketFacets};
 use super::ggx::Ggx;
 use super::matte::infinity;
+use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, fresnel, mirrored, none, only, ratio};
-use crate::lanes::space::{add, normalize};
+use crate::lanes::space::{add, choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
 use crate::shade::path::points::{PARAM, Points};
 
@@ -28,11 +32,11 @@ impl<V: Lanes> Metal<V> {
 /// A perfect mirror of metal.
 pub struct SmoothConductor<V>(Metal<V>);
 
-impl<V: Lanes> Bsdf<V> for SmoothConductor<V> {
+impl<V: Lanes> Bsdf<'_, V> for SmoothConductor<V> {
     const SMOOTH: bool = true;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
+    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
         Self(Metal::load(points, first))
     }
 
@@ -49,17 +53,19 @@ impl<V: Lanes> Bsdf<V> for SmoothConductor<V> {
 }
 
 /// Facets of metal.
-pub struct RoughConductor<V> {
+pub struct RoughConductor<'t, V> {
     metal: Metal<V>,
     ggx: Ggx<V>,
+    facets: PacketFacets<'t, V>,
 }
 
-impl<V: Lanes> Bsdf<V> for RoughConductor<V> {
+impl<'t, V: Lanes> Bsdf<'t, V> for RoughConductor<'t, V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
-        Self { metal: Metal::load(points, first), ggx: Ggx::new(points.scalar(PARAM + 6, first)) }
+    fn load(points: &Points<V::Scalar>, first: usize, facets: &'t FacetsList) -> Self {
+        let facets = PacketFacets::load(facets, points.scalar(PARAM + 6, first));
+        Self { metal: Metal::load(points, first), ggx: Ggx::new(facets.alpha), facets }
     }
 
     #[inline(always)]
@@ -67,19 +73,22 @@ impl<V: Lanes> Bsdf<V> for RoughConductor<V> {
         let h = normalize(add(wo, wi));
         let cos = dot(wo, h);
         let shape = self.ggx.density(h) * self.ggx.masking_both(wo, wi) / (V::constant(4.0) * wo[2]);
-        let value = self.metal.reflectance(cos).map(|f| f * shape);
-        let pdf = self.ggx.visible_pdf(wo, h) / (V::constant(4.0) * cos);
+        let single = self.ggx.visible_pdf(wo, h) / (V::constant(4.0) * cos);
+        let lambert = wi[2] * V::constant(FRAC_1_PI);
+        let chance = self.facets.lost(wo[2]);
+        let wide = chance * self.facets.lost(wi[2]) * lambert;
+        let reflectance = self.metal.reflectance(cos);
+        let value = [0, 1, 2].map(|c| reflectance[c].mul_add(shape, self.facets.up[c] * wide));
+        let pdf = chance.mul_add(lambert - single, single);
         only(V::constant(0.0).cmp_lt(wi[2]), Value { value, pdf })
     }
 
     #[inline(always)]
-    fn sample(&self, wo: Lanes3<V>, place: [V; 2], _: V) -> Sampled<V> {
-        let h = self.ggx.visible(wo, place);
-        let (wi, weight, pdf) = reflected(&self.ggx, wo, h);
-        let alive = V::constant(0.0).cmp_lt(wi[2]);
-        let share = V::select(alive, weight, V::constant(0.0));
-        let weight = self.metal.reflectance(dot(wo, h)).map(|f| f * share);
-        Sampled { wi, weight, pdf, squeeze: V::constant(1.0) }
+    fn sample(&self, wo: Lanes3<V>, place: [V; 2], choice: V) -> Sampled<V> {
+        let (up, ..) = reflected(&self.ggx, wo, self.ggx.visible(wo, place));
+        let wi = choose(choice.cmp_lt(self.facets.lost(wo[2])), cosine(place), up);
+        let found = self.eval(wo, wi);
+        Sampled { wi, weight: found.value.map(|c| ratio(c, found.pdf)), pdf: found.pdf, squeeze: V::constant(1.0) }
     }
 }
 

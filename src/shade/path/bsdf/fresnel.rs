@@ -48,12 +48,16 @@ pub fn schlick<V: Lanes>(cos: V, f0: Lanes3<V>) -> Lanes3<V> {
     f0.map(|f| m5.mul_add(one - f, f))
 }
 
-/// Mean over the hemisphere, weighted by the cosine, of what a dielectric boundary reflects (see [`dielectric`]), by
-/// Gauss's midpoint rule in the square of the cosine.
-pub fn dielectric_mean(eta: f64) -> f64 {
+/// Mean over the hemisphere, weighted by the cosine, of `f` of the cosine, by Gauss's midpoint rule in its square.
+pub fn mean(f: impl Fn(f64) -> f64) -> f64 {
     const STEPS: u32 = 4096;
-    let at = |i: u32| dielectric(((f64::from(i) + 0.5) / f64::from(STEPS)).sqrt(), eta).0;
+    let at = |i: u32| f(((f64::from(i) + 0.5) / f64::from(STEPS)).sqrt());
     (0..STEPS).map(at).sum::<f64>() / f64::from(STEPS)
+}
+
+/// The same of what a dielectric boundary reflects (see [`dielectric`]).
+pub fn dielectric_mean(eta: f64) -> f64 {
+    mean(|cos| dielectric(cos, eta).0)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_1_PI;
 
+use super::facets::FacetsList;
 use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, brightness, mirrored, only, ratio};
 use crate::lanes::space::choose;
@@ -16,11 +17,11 @@ pub struct Matte<V> {
     chance: V,
 }
 
-impl<V: Lanes> Bsdf<V> for Matte<V> {
+impl<V: Lanes> Bsdf<'_, V> for Matte<V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
+    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
         let (diffuse, mirror) = (points.vector(BASE, first), points.vector(PARAM, first));
         let d = brightness::<V>(diffuse);
         Self { diffuse, mirror, chance: ratio(d, d + brightness(mirror)) }

@@ -1,12 +1,16 @@
 //! glTF's material: metal and coated diffuse base blended, part of the base a thin sheet of tinted glass.
 //!
 //! Source: Khronos Group, "glTF 2.0 Specification", appendix B, and the extensions KHR_materials_ior and
-//! KHR_materials_transmission; Schlick's Fresnel term, GGX with height-correlated masking.
+//! KHR_materials_transmission; Schlick's Fresnel term, GGX with height-correlated masking. Of the couplings that
+//! appendix discusses ours keeps all light: what facets throw at each other comes back (see [`super::facets`]), and the
+//! base gets what they do not reflect at all, as C. Kelemen and L. Szirmay-Kalos have it (2001).
 
 use std::f64::consts::FRAC_1_PI;
 
 use super::conductor::reflected;
+use super::facets::{FacetsList, repeated};
 use super::ggx::Ggx;
+use super::rows::PacketRows;
 use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, brightness, fresnel, only, ratio};
 use crate::lanes::space::{add, choose, normalize};
@@ -18,49 +22,64 @@ pub struct MetalRough<V> {
     /// Diffuse reflectance and transmittance under a coat that reflects nothing.
     diffuse: Lanes3<V>,
     through: Lanes3<V>,
-    /// Reflectance at normal incidence.
+    /// Reflectance at normal incidence, and of light that many facets have thrown at each other.
     f0: Lanes3<V>,
+    many: Lanes3<V>,
     ggx: Ggx<V>,
+    rows: PacketRows<V>,
 }
 
-/// Chances of the three lobes.
+/// Albedos in one direction, or their means.
+struct Albedo<V> {
+    /// Of facets that mirror all, what they lose.
+    lost: V,
+    /// What comes back from one facet.
+    once: Lanes3<V>,
+    /// What facets do not reflect at all.
+    under: Lanes3<V>,
+}
+
+/// Chances of the lobes: of facets and as wide as Lambert's, above and below.
 struct Chances<V> {
     facets: V,
-    diffuse: V,
-    through: V,
+    wide: V,
+    facets_below: V,
+    wide_below: V,
 }
 
 impl<V: Lanes> MetalRough<V> {
     #[inline(always)]
-    fn chances(&self, wo: Lanes3<V>) -> Chances<V> {
-        let one = V::constant(1.0);
-        let f = brightness(fresnel::schlick(wo[2], self.f0));
-        let rest = one - f;
-        let (diffuse, through) = (rest * brightness(self.diffuse), rest * brightness(self.through));
-        let all = f + diffuse + through;
-        Chances { facets: f / all, diffuse: diffuse / all, through: through / all }
+    fn albedo(&self, lost: V, fifth: V) -> Albedo<V> {
+        let (zero, one) = (V::constant(0.0), V::constant(1.0));
+        let once = self.f0.map(|f| f * (one - lost) + (one - f) * fifth);
+        let under = [0, 1, 2].map(|c| (one - once[c] - lost * self.many[c]).fast_max(zero));
+        Albedo { lost, once, under }
     }
-}
-
-impl<V: Lanes> Bsdf<V> for MetalRough<V> {
-    const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
+    fn albedo_at(&self, cos: V) -> Albedo<V> {
+        self.albedo(self.rows.lost(cos), self.rows.fifth(cos))
+    }
+
+    #[inline(always)]
+    fn chances(&self, out: &Albedo<V>) -> Chances<V> {
         let one = V::constant(1.0);
-        let base = points.vector::<V>(BASE, first);
-        let [metallic, alpha, f0, transmission] = [0, 1, 2, 3].map(|i| points.scalar::<V>(PARAM + i, first));
-        let body = one - metallic;
-        Self {
-            diffuse: base.map(|c| c * body * (one - transmission)),
-            through: base.map(|c| c * body * transmission),
-            f0: base.map(|c| metallic.mul_add(c, body * f0)),
-            ggx: Ggx::new(alpha),
+        let part = |f: &dyn Fn(usize) -> V| brightness([f(0), f(1), f(2)]);
+        let facets = brightness(out.once);
+        let wide = part(&|c| self.many[c].mul_add(out.lost, self.diffuse[c] * out.under[c]));
+        let facets_below = part(&|c| (one - out.lost - out.once[c]) * self.through[c]);
+        let wide_below = part(&|c| (one - self.many[c]) * out.lost * self.through[c]);
+        let rcp = one / (facets + wide + facets_below + wide_below);
+        Chances {
+            facets: facets * rcp,
+            wide: wide * rcp,
+            facets_below: facets_below * rcp,
+            wide_below: wide_below * rcp,
         }
     }
 
     #[inline(always)]
-    fn eval(&self, wo: Lanes3<V>, wi: Lanes3<V>) -> Value<V> {
+    fn value(&self, wo: Lanes3<V>, wi: Lanes3<V>, out: &Albedo<V>, chances: &Chances<V>) -> Value<V> {
         let (zero, one, four) = (V::constant(0.0), V::constant(1.0), V::constant(4.0));
         let above = zero.cmp_lt(wi[2]);
         // What passes the sheet has the shape of what it reflects, seen from behind.
@@ -71,35 +90,65 @@ impl<V: Lanes> Bsdf<V> for MetalRough<V> {
         let facets = self.ggx.density(h) * self.ggx.masking_both(wo, wi) / (four * wo[2]);
         let facets_pdf = self.ggx.visible_pdf(wo, h) / (four * cos);
         let lambert = wi[2] * V::constant(FRAC_1_PI);
-        let chances = self.chances(wo);
+        let into = self.albedo_at(wi[2]);
+        let means = self.albedo(self.rows.means[0], self.rows.means[1]);
+        let thrown = ratio(out.lost * into.lost * lambert, means.lost);
         let value = [0, 1, 2].map(|c| {
-            let pass = one - f[c];
-            let up = facets.mul_add(f[c], lambert * pass * self.diffuse[c]);
-            V::select(above, up, facets * pass * self.through[c])
+            let base = ratio(out.under[c] * into.under[c] * self.diffuse[c] * lambert, means.under[c]);
+            let up = facets.mul_add(f[c], thrown.mul_add(self.many[c], base));
+            let down = (facets * (one - f[c]) + thrown * (one - self.many[c])) * self.through[c];
+            V::select(above, up, down)
         });
-        let up_pdf = chances.facets.mul_add(facets_pdf, chances.diffuse * lambert);
-        let pdf = V::select(above, up_pdf, chances.through * facets_pdf);
-        only(zero.cmp_lt(wi[2]), Value { value, pdf })
+        let up_pdf = chances.facets.mul_add(facets_pdf, chances.wide * lambert);
+        let down_pdf = chances.facets_below.mul_add(facets_pdf, chances.wide_below * lambert);
+        only(zero.cmp_lt(wi[2]), Value { value, pdf: V::select(above, up_pdf, down_pdf) })
+    }
+}
+
+impl<V: Lanes> Bsdf<'_, V> for MetalRough<V> {
+    const SMOOTH: bool = false;
+
+    #[inline(always)]
+    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
+        let one = V::constant(1.0);
+        let base = points.vector::<V>(BASE, first);
+        let [metallic, alpha, f0, transmission] = [0, 1, 2, 3].map(|i| points.scalar::<V>(PARAM + i, first));
+        let body = one - metallic;
+        let rows = PacketRows::new(alpha);
+        let f0 = base.map(|c| metallic.mul_add(c, body * f0));
+        // The mean of (1 - cos)^5 over the hemisphere, weighted by the cosine, is 1 / 21.
+        let mean = f0.map(|f| (one - f).mul_add(V::constant(1.0 / 21.0), f));
+        Self {
+            diffuse: base.map(|c| c * body * (one - transmission)),
+            through: base.map(|c| c * body * transmission),
+            f0,
+            many: mean.map(|f| repeated(f, rows.means[0])),
+            ggx: Ggx::new(alpha),
+            rows,
+        }
+    }
+
+    #[inline(always)]
+    fn eval(&self, wo: Lanes3<V>, wi: Lanes3<V>) -> Value<V> {
+        let out = self.albedo_at(wo[2]);
+        self.value(wo, wi, &out, &self.chances(&out))
     }
 
     #[inline(always)]
     fn sample(&self, wo: Lanes3<V>, place: [V; 2], choice: V) -> Sampled<V> {
-        let chances = self.chances(wo);
+        let zero = V::constant(0.0);
+        let out = self.albedo_at(wo[2]);
+        let chances = self.chances(&out);
         let (up, ..) = reflected(&self.ggx, wo, self.ggx.visible(wo, place));
-        let is_facets = choice.cmp_lt(chances.facets);
-        let is_through = (chances.facets + chances.diffuse).cmp_le(choice);
+        let above = chances.facets + chances.wide;
+        let is_below = above.cmp_le(choice);
+        let is_facets = choice.cmp_lt(chances.facets) | (is_below & choice.cmp_lt(above + chances.facets_below));
         let wi = choose(is_facets, up, cosine(place));
-        let wi = choose(is_through, [up[0], up[1], -up[2]], wi);
-        let found = self.eval(wo, wi);
         // A facet may mirror light into the surface: such a direction belongs to no lobe.
-        let lost = !is_through_or(is_facets, is_through, up);
-        let weight = found.value.map(|c| V::select(lost, V::constant(0.0), ratio(c, found.pdf)));
+        let is_lost = wi[2].cmp_le(zero);
+        let wi = [wi[0], wi[1], V::select(is_below, -wi[2], wi[2])];
+        let found = self.value(wo, wi, &out, &chances);
+        let weight = found.value.map(|c| V::select(is_lost, zero, ratio(c, found.pdf)));
         Sampled { wi, weight, pdf: found.pdf, squeeze: V::constant(1.0) }
     }
-}
-
-/// Whether the lobe that was chosen has the direction: the diffuse one always, the others if `up` points up.
-#[inline(always)]
-fn is_through_or<M: crate::lanes::LaneMask, V: Lanes<Mask = M>>(facets: M, through: M, up: Lanes3<V>) -> M {
-    !(facets | through) | V::constant(0.0).cmp_lt(up[2])
 }

@@ -6,14 +6,18 @@
 
 mod coat;
 mod conductor;
+mod curve;
 mod dielectric;
+pub(in crate::shade) mod facets;
 pub(in crate::shade) mod fresnel;
 mod ggx;
 mod matte;
 mod metal_rough;
+mod rows;
 mod thin;
 mod warp;
 
+use self::facets::FacetsList;
 use super::points::Points;
 use crate::lanes::{Lanes, Lanes3};
 
@@ -47,11 +51,11 @@ pub(super) struct Sampled<V> {
 }
 
 /// A model with the parameters of one packet of points.
-pub(super) trait Bsdf<V: Lanes>: Sized {
+pub(super) trait Bsdf<'t, V: Lanes>: Sized {
     /// Whether all directions it samples are of perfect mirrors and the like: no light can be aimed at.
     const SMOOTH: bool;
-    /// The parameters of points `first..first + N`.
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self;
+    /// The parameters of points `first..first + N`, whose tables of rough surfaces are in `facets`.
+    fn load(points: &Points<V::Scalar>, first: usize, facets: &'t FacetsList) -> Self;
     /// Light from `wi`, without perfect mirrors and the like.
     fn eval(&self, wo: Lanes3<V>, wi: Lanes3<V>) -> Value<V>;
     /// A direction from three numbers in [0, 1): two for the place, one for the choice of a lobe.

@@ -2,9 +2,11 @@
 //! over density, reciprocity, and lanes that never look at each other.
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use glam::DVec3;
 
+use super::facets::{FacetsList, Rough};
 use super::{
     Bsdf, Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric,
     Thin, fresnel::dielectric_mean,
@@ -35,12 +37,52 @@ fn packet<S: Real>(list: &[Params]) -> Points<S> {
 
 const COPPER: [f64; 6] = [0.21, 0.93, 1.1, 3.6, 2.6, 2.3];
 
-fn copper(alpha: f64) -> [f64; 7] {
-    std::array::from_fn(|i| if i < 6 { COPPER[i] } else { alpha })
+/// Widths of facets that are tested.
+const WIDTHS: [f64; 7] = [0.15, 0.3, 0.5, 0.7, 0.9, 1.0, 0.02];
+/// Their indices of refraction, each after its reciprocal.
+const INDICES: [f64; 4] = [1.0 / 1.5, 1.5, 0.7, 1.0 / 0.7];
+
+fn metal_of(alpha: f64) -> Rough {
+    let index = [[0, 1, 2].map(|c| COPPER[c]), [3, 4, 5].map(|c| COPPER[c])];
+    Rough::Metal { alpha, index, is_multiple: true }
 }
 
+fn glass_of(alpha: f64, eta: f64) -> Rough {
+    Rough::Glass { alpha, eta, is_multiple: true }
+}
+
+fn coat_of(alpha: f64) -> Rough {
+    Rough::Coat { alpha, eta: 1.5 }
+}
+
+fn all_rough() -> Vec<Rough> {
+    let of_width = |alpha: f64| {
+        let glass = INDICES.map(|eta| glass_of(alpha, eta));
+        [metal_of(alpha), coat_of(alpha)].into_iter().chain(glass)
+    };
+    WIDTHS.into_iter().flat_map(of_width).collect()
+}
+
+static FACETS: LazyLock<FacetsList> = LazyLock::new(|| FacetsList::new(&all_rough()));
+
+/// The number of `rough` in [`FACETS`].
+fn number(rough: &Rough) -> f64 {
+    all_rough().iter().position(|other| other == rough).expect("a surface of the list") as f64
+}
+
+fn copper(alpha: f64) -> [f64; 7] {
+    let number = number(&metal_of(alpha));
+    std::array::from_fn(|i| if i < 6 { COPPER[i] } else { number })
+}
+
+fn glass(alpha: f64, eta: f64) -> [f64; 7] {
+    [eta, alpha, number(&glass_of(alpha, eta)), 0.0, 0.0, 0.0, 0.0]
+}
+
+/// Smooth for a width of 0.
 fn coat(alpha: f64) -> [f64; 7] {
-    [1.5, dielectric_mean(1.0 / 1.5), alpha, 0.0, 0.0, 0.0, 0.0]
+    let number = if alpha > 0.0 { number(&coat_of(alpha)) } else { 0.0 };
+    [1.5, dielectric_mean(1.0 / 1.5), alpha, number, 0.0, 0.0, 0.0]
 }
 
 const BASE_COLOR: [f64; 3] = [0.8, 0.5, 0.3];
@@ -65,8 +107,8 @@ impl Moments {
 
 /// Checks that the density of `eval` has the moments of the directions that `sample` finds, and that what the weights
 /// add up to is the integral of the value.
-fn density_is_of_samples<B: Bsdf<f64>>(name: &str, params: &Params) {
-    let bsdf = B::load(&everywhere(params), 0);
+fn density_is_of_samples<B: Bsdf<'static, f64>>(name: &str, params: &Params) {
+    let bsdf = B::load(&everywhere(params), 0, &FACETS);
     for wo in [unit(0.9, 0.4), unit(0.35, 2.0)] {
         const SAMPLES: u32 = 1 << 17;
         const STEPS: u32 = 1200;
@@ -104,8 +146,8 @@ fn density_is_of_samples<B: Bsdf<f64>>(name: &str, params: &Params) {
 }
 
 /// Checks that the value and density of a sampled direction are those that `eval` gives, and the weight their ratio.
-fn weights_are_ratios<B: Bsdf<f64>>(name: &str, params: &Params) {
-    let bsdf = B::load(&everywhere(params), 0);
+fn weights_are_ratios<B: Bsdf<'static, f64>>(name: &str, params: &Params) {
+    let bsdf = B::load(&everywhere(params), 0, &FACETS);
     let points = PixelPoints::new(5, 6, 7);
     let mut checked = 0;
     for i in 0..4000 {
@@ -129,8 +171,8 @@ fn weights_are_ratios<B: Bsdf<f64>>(name: &str, params: &Params) {
 }
 
 /// Checks f(a, b) = f(b, a) for directions on one side.
-fn reflection_is_reciprocal<B: Bsdf<f64>>(name: &str, params: &Params) {
-    let bsdf = B::load(&everywhere(params), 0);
+fn reflection_is_reciprocal<B: Bsdf<'static, f64>>(name: &str, params: &Params) {
+    let bsdf = B::load(&everywhere(params), 0, &FACETS);
     let points = PixelPoints::new(8, 9, 1);
     for i in 0..2000 {
         let ([a, b], [c, d]) = (points.point(i, 0), points.point(i, 1));
@@ -189,7 +231,7 @@ fn metallic_roughness_is_consistent() {
 fn rough_glass_is_consistent() {
     for eta in [1.5, 1.0 / 1.5] {
         for alpha in [0.15, 0.5, 1.0] {
-            let params = (BASE_COLOR, [eta, alpha, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            let params = (BASE_COLOR, glass(alpha, eta));
             density_is_of_samples::<RoughDielectric<f64>>("glass", &params);
             weights_are_ratios::<RoughDielectric<f64>>("glass", &params);
             reflection_is_reciprocal::<RoughDielectric<f64>>("glass", &params);
@@ -201,12 +243,11 @@ fn rough_glass_is_consistent() {
 #[test]
 fn refraction_is_reciprocal_but_for_the_squeeze() {
     let points = PixelPoints::new(3, 1, 4);
-    let load = |eta: f64, alpha: f64| {
-        RoughDielectric::<f64>::load(&everywhere(&([1.0; 3], [eta, alpha, 0.0, 0.0, 0.0, 0.0, 0.0])), 0)
-    };
+    let load =
+        |eta: f64, alpha: f64| RoughDielectric::<f64>::load(&everywhere(&([1.0; 3], glass(alpha, eta))), 0, &FACETS);
     let mut lit = 0;
     for (eta, alpha) in [(1.5, 0.3), (1.5, 0.9), (0.7, 0.5)] {
-        let (front, back) = (load(eta, alpha), load(1.0 / eta, alpha));
+        let (front, back) = (load(eta, alpha), load(if eta == 1.5 { INDICES[0] } else { INDICES[3] }, alpha));
         for i in 0..2000 {
             let ([a, b], [c, d]) = (points.point(i, 0), points.point(i, 1));
             let (up, down) = (unit(0.05 + 0.95 * a, b * TAU), unit(-0.05 - 0.95 * c, d * TAU));
@@ -226,9 +267,9 @@ fn refraction_is_reciprocal_but_for_the_squeeze() {
 fn smooth_models_follow_the_laws() {
     let wo = unit(0.6, 1.0);
     let (tint, eta) = ([0.9, 0.8, 0.7], 1.5);
-    let glass = SmoothDielectric::<f64>::load(&everywhere(&(tint, [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), 0);
-    let pane = Thin::<f64>::load(&everywhere(&(tint, [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), 0);
-    let metal = SmoothConductor::<f64>::load(&everywhere(&([0.0; 3], copper(0.0))), 0);
+    let glass = SmoothDielectric::<f64>::load(&everywhere(&(tint, [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), 0, &FACETS);
+    let pane = Thin::<f64>::load(&everywhere(&(tint, [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), 0, &FACETS);
+    let metal = SmoothConductor::<f64>::load(&everywhere(&([0.0; 3], copper(0.15))), 0, &FACETS);
     let (reflected, through) = (glass.sample(wo, [0.3; 2], 0.0), glass.sample(wo, [0.3; 2], 0.9999));
     assert_eq!((reflected.wi, reflected.weight), ([-wo[0], -wo[1], wo[2]], [1.0; 3]));
     // Snell: sines in the ratio of the indices, in one plane.
@@ -254,7 +295,7 @@ fn smooth_models_follow_the_laws() {
 }
 
 /// Lane `i` of a packet gives the bits that the same numbers give alone.
-fn lanes_are_alone<S: Real, W: Bsdf<S::Wide>, B: Bsdf<S>>(name: &str, list: &[Params]) {
+fn lanes_are_alone<S: Real, W: Bsdf<'static, S::Wide>, B: Bsdf<'static, S>>(name: &str, list: &[Params]) {
     let points = packet::<S>(list);
     let numbers = PixelPoints::new(2, 7, 1);
     let same = |a: S, b: S| a == b || (a.to_f64().is_nan() && b.to_f64().is_nan());
@@ -271,12 +312,12 @@ fn lanes_are_alone<S: Real, W: Bsdf<S::Wide>, B: Bsdf<S>>(name: &str, list: &[Pa
         };
         let vector = |f: &dyn Fn(usize) -> [S; 3]| -> Lanes3<S::Wide> { [0, 1, 2].map(|c| load(&|lane| f(lane)[c])) };
         let (wo, wi) = (|lane| direction(lane, 0, 1e-3), |lane| direction(lane, 1, -1.0));
-        let wide = W::load(&points, 0);
+        let wide = W::load(&points, 0, &FACETS);
         let place = [load(&|lane| number(lane, 2)[0]), load(&|lane| number(lane, 2)[1])];
         let value = wide.eval(vector(&wo), vector(&wi));
         let sampled = wide.sample(vector(&wo), place, load(&|lane| number(lane, 3)[0]));
         for lane in 0..width {
-            let narrow = B::load(&points, lane);
+            let narrow = B::load(&points, lane, &FACETS);
             let (v, s) =
                 (narrow.eval(wo(lane), wi(lane)), narrow.sample(wo(lane), number(lane, 2), number(lane, 3)[0]));
             let all = (0..3).all(|c| {
@@ -304,7 +345,7 @@ fn spread(params: Params) -> Vec<Params> {
 }
 
 fn all_models_alone<S: Real>() {
-    let glass = spread((BASE_COLOR, [1.5, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0]));
+    let glass = spread((BASE_COLOR, glass(0.3, 1.5)));
     let metal = spread(([0.0; 3], copper(0.3)));
     let plastic = spread((BASE_COLOR, coat(0.3)));
     let gltf = spread((BASE_COLOR, [0.4, 0.5, 0.04, 0.5, 0.0, 0.0, 0.0]));

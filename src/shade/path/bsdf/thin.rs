@@ -1,5 +1,6 @@
 //! A thin pane of glass: mirror and straight passage, with all reflections between its two sides.
 
+use super::facets::FacetsList;
 use super::matte::infinity;
 use super::{Bsdf, Sampled, Value, fresnel, mirrored, none};
 use crate::lanes::space::choose;
@@ -12,11 +13,11 @@ pub struct Thin<V> {
     ior: V,
 }
 
-impl<V: Lanes> Bsdf<V> for Thin<V> {
+impl<V: Lanes> Bsdf<'_, V> for Thin<V> {
     const SMOOTH: bool = true;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
+    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
         Self { tint: points.vector(BASE, first), ior: points.scalar(PARAM, first) }
     }
 

@@ -1,0 +1,168 @@
+//! Cryptomattes of a picture: what each pixel's samples met first, counted.
+//!
+//! Samples are placed with the density of the filter and count the same, so shares of them are coverages.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+use super::aov::Aov;
+use crate::error::locked;
+use crate::film::{Film, Plane, PlaneData, Window, cryptomatte};
+use crate::lanes::Real;
+use crate::ray::INVALID_ID;
+use crate::scene::assembly::{Assembly, PartKind};
+use crate::scene::description::{Description, Shape};
+use crate::scene::world::World;
+use crate::shade::Sample;
+
+/// Layers: objects, materials.
+const LAYERS: [&str; 2] = ["cryptoObject", "cryptoMaterial"];
+
+/// A thing that may be in a pixel: instance, part of its object, group of the part's mesh; material, 0, 0.
+type Thing = [u32; 3];
+
+/// How many samples of a pixel met which things first, layer by layer.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Coverage([Vec<(Thing, u32)>; 2]);
+
+impl Coverage {
+    /// Nothing.
+    pub fn clear(&mut self) {
+        self.0.iter_mut().for_each(Vec::clear);
+    }
+}
+
+/// Names and planes of the mattes of a picture.
+pub(super) struct Mattes<'a> {
+    assembly: &'a Assembly,
+    description: &'a Description,
+    /// How many placements an object has.
+    placed: Vec<u32>,
+    /// First of the film's planes that are mattes.
+    first_plane: usize,
+    /// What was seen: names and ids, by layer.
+    seen: Mutex<[BTreeMap<String, u32>; 2]>,
+}
+
+impl<'a> Mattes<'a> {
+    /// Those of a picture of `world` with the planes `aovs`, if they are wanted; their planes are added to `film`.
+    pub fn new<S: Real>(
+        world: &'a World<S>,
+        description: &'a Description,
+        aovs: &[Aov],
+        film: &mut Film,
+    ) -> Option<Self> {
+        if !aovs.contains(&Aov::Cryptomatte) {
+            return None;
+        }
+        let assembly = &world.assembly;
+        let mut placed = vec![0; assembly.objects.len()];
+        assembly.placements.iter().for_each(|placement| placed[placement.object as usize] += 1);
+        let (first_plane, pixels) = (film.planes.len(), film.pixels());
+        let names = LAYERS.iter().flat_map(|layer| cryptomatte::planes(layer));
+        film.planes.extend(names.map(|name| Plane { name, data: PlaneData::F32(vec![0.0; pixels]) }));
+        Some(Self { assembly, description, placed, first_plane, seen: Mutex::default() })
+    }
+
+    /// Counts `samples` into the coverages of their pixels; those of misses count for nothing.
+    pub fn count(&self, samples: &[Sample], coverages: &mut Vec<Coverage>) {
+        coverages.resize_with(samples.len(), Coverage::default);
+        for (sample, coverage) in samples.iter().zip(coverages) {
+            if sample.inst == INVALID_ID {
+                continue;
+            }
+            for (thing, list) in [self.object(sample), [sample.material, 0, 0]].into_iter().zip(&mut coverage.0) {
+                match list.iter_mut().find(|(known, _)| *known == thing) {
+                    Some((_, count)) => *count += 1,
+                    None => list.push((thing, 1)),
+                }
+            }
+        }
+    }
+
+    fn object(&self, sample: &Sample) -> Thing {
+        let object = &self.assembly.objects[self.assembly.placements[sample.inst as usize].object as usize];
+        let part = object.parts.partition_point(|part| part.first_prim <= sample.prim).saturating_sub(1);
+        let group = match &object.parts[part].kind {
+            PartKind::Mesh(mesh) => {
+                let triangle = sample.prim - object.parts[part].first_prim;
+                mesh.groups.partition_point(|group| group.first <= triangle).saturating_sub(1)
+            }
+            PartKind::Shape(_) | PartKind::Solids(_) => 0,
+        };
+        [sample.inst, part as u32, group as u32]
+    }
+
+    /// What layer `layer` calls `thing`. Objects: group of the scene, name or kind of the part; where the group is
+    /// placed several times, the number of the instance after `@`.
+    fn name(&self, layer: usize, [first, part, group]: Thing) -> String {
+        if layer == 1 {
+            return self.description.materials.get(first as usize).map_or("default".into(), |m| m.name.clone());
+        }
+        let number = self.assembly.placements[first as usize].object as usize;
+        let object = &self.assembly.objects[number];
+        let named = |name: &str, kind: &str| if name.is_empty() { format!("{kind} {part}") } else { name.to_owned() };
+        let name = match &object.parts[part as usize].kind {
+            PartKind::Mesh(mesh) => named(mesh.groups.get(group as usize).map_or("", |g| &g.name), "mesh"),
+            PartKind::Solids(tree) => named(&tree.name, "solid"),
+            PartKind::Shape(shape) => named("", kind(shape)),
+        };
+        let place = if self.placed[number] > 1 { format!("@{first}") } else { String::new() };
+        let gap = if object.name.is_empty() { "" } else { "/" };
+        format!("{}{gap}{name}{place}", object.name)
+    }
+
+    /// Writes the ranks of those of `pixels` that lie in `window` to `film`; each had `count` samples.
+    pub fn paint(&self, film: &mut Film, window: Window, pixels: &[(u32, u32)], coverages: &[Coverage], count: u32) {
+        let mut names: [BTreeMap<Thing, (String, u32)>; 2] = Default::default();
+        for (&(x, y), coverage) in pixels.iter().zip(coverages) {
+            let Some(place) = window.index(x, y) else { continue };
+            for (layer, list) in coverage.0.iter().enumerate() {
+                // Different things of one name are one.
+                let mut shares: BTreeMap<u32, u32> = BTreeMap::new();
+                for &(thing, samples) in list {
+                    let name = || {
+                        let name = self.name(layer, thing);
+                        let id = cryptomatte::id(&name);
+                        (name, id)
+                    };
+                    *shares.entry(names[layer].entry(thing).or_insert_with(name).1).or_default() += samples;
+                }
+                let mut ranks: Vec<(u32, u32)> = shares.into_iter().collect();
+                ranks.sort_by_key(|&(id, samples)| (u32::MAX - samples, id));
+                for (rank, &(id, samples)) in ranks.iter().take(cryptomatte::RANKS).enumerate() {
+                    let plane = self.first_plane + 2 * (layer * cryptomatte::RANKS + rank);
+                    let values = [f32::from_bits(id), (f64::from(samples) / f64::from(count)) as f32];
+                    for (plane, value) in film.planes[plane..].iter_mut().zip(values) {
+                        if let PlaneData::F32(data) = &mut plane.data {
+                            data[place] = value;
+                        }
+                    }
+                }
+            }
+        }
+        let mut seen = locked(&self.seen);
+        for (all, found) in seen.iter_mut().zip(names) {
+            all.extend(found.into_values());
+        }
+    }
+
+    /// Adds the attributes that say what the ids mean to `film`.
+    pub fn finish(self, film: &mut Film) {
+        let seen = self.seen.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        for (layer, names) in LAYERS.iter().zip(&seen) {
+            film.texts.extend(cryptomatte::attributes(layer, names));
+        }
+    }
+}
+
+fn kind(shape: &Shape) -> &'static str {
+    match shape {
+        Shape::Sphere => "sphere",
+        Shape::HalfSpace => "half-space",
+        Shape::Disc => "disc",
+        Shape::Cuboid => "box",
+        Shape::Cylinder => "cylinder",
+        Shape::Cone { .. } => "cone",
+    }
+}
