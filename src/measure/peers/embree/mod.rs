@@ -18,6 +18,7 @@ use std::sync::Arc;
 
 use super::triangles::PlacedTriangles;
 use super::{Facts, Packed, Peer, rename};
+use crate::lanes::compiled_isa;
 use crate::measure::raysets::Query;
 use crate::ray::{Hits, INVALID_ID, Rays};
 use api::Arguments;
@@ -79,11 +80,23 @@ pub fn open(
     Err(format!("no Embree 4 (give --embree PATH or set {VARIABLE}): {telling}"))
 }
 
+/// What keeps Embree's kernels from being wider than those of this build: in words, and for its device. Nothing, if ours
+/// are as wide as it knows.
+fn widest() -> (&'static str, &'static str) {
+    match compiled_isa() {
+        "avx2" => (", max_isa avx2", ",max_isa=avx2"),
+        "avx" => (", max_isa avx", ",max_isa=avx"),
+        "sse2" => (", max_isa sse4.2", ",max_isa=sse4.2"),
+        _ => ("", ""),
+    }
+}
+
 fn modes(session: Session, triangles: &Arc<PlacedTriangles>, robust: bool) -> Vec<Box<dyn Peer<f32>>> {
     let [major, minor, patch] = session.version;
     let flags = if robust { "ROBUST" } else { "none" };
     let more = if session.hit_rows > layout::HIT_ROWS + 1 { ", instPrimID in hits" } else { "" };
     let mut description = format!("Embree {major}.{minor}.{patch}, quality HIGH, scene flags {flags}{more}");
+    description += widest().0;
     if !triangles.instances.is_empty() {
         let (instances, objects) = (triangles.instances.len(), triangles.objects.len());
         description += &format!(", {instances} instances of {objects} objects");

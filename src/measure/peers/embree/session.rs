@@ -48,8 +48,8 @@ impl Session {
     /// Why this library cannot be used.
     pub fn open(path: &Path, triangles: Arc<PlacedTriangles>, threads: usize, robust: bool) -> Result<Self, String> {
         let api = Arc::new(Api::load(path)?);
-        let config =
-            CString::new(format!("threads={threads},start_threads=1,hugepages=1")).map_err(|e| e.to_string())?;
+        let config = format!("threads={threads},start_threads=1,hugepages=1{}", super::widest().1);
+        let config = CString::new(config).map_err(|e| e.to_string())?;
         // SAFETY: the configuration is a string that ends in zero and lives through the call.
         let device = unsafe { (api.new_device)(config.as_ptr()) };
         if device.is_null() {
