@@ -139,7 +139,7 @@ fn files_say_what_covers_each_pixel() {
         let names = manifest(&attributes, "cryptoMaterial");
         assert!(names.contains_key("red \"é\"") && names.contains_key("blue") && names.contains_key("default"));
         // A pixel well inside a ball is wholly that ball.
-        let inside = 16 * 48 + 13;
+        let inside = 16 * 48 + 17;
         let objects = ranks(&read, "cryptoObject");
         assert!((objects[inside][0].1 - 1.0).abs() < 1e-6, "{:?}", objects[inside]);
     }

@@ -48,7 +48,8 @@ use super::through::{Again, MIXTURE, Through, number};
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::Real;
 use crate::ray::{Hits, Rays};
-use crate::scene::description::Description;
+use crate::scene::description::{Description, Material};
+use crate::scene::material::Scattering;
 use crate::scene::world::{Surface, World};
 use crate::trace::Engine;
 
@@ -110,7 +111,8 @@ impl<'a, S: Real> Paths<'a, S> {
         settings: &Settings,
     ) -> Self {
         let lights = Lights::new(world, description, &looks);
-        let facets = FacetsList::new(&looks.rough);
+        let is_of_all_widths = |m: &Material| matches!(m.scattering, Scattering::MetallicRoughness { .. });
+        let facets = FacetsList::new(&looks.rough, description.materials.iter().any(is_of_all_widths));
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
         let Settings { depth, seed, first_hits, .. } = *settings;
         let (has_facets, bare) = (world.has_facets(), BareTriangles::new(world, &looks, settings.rays));

@@ -64,6 +64,12 @@ impl Curve {
         Self { alpha, knots }
     }
 
+    /// Two functions, worked out together.
+    pub fn pair(alpha: f64, f: impl Fn(f64) -> [f64; 2] + Sync) -> [Self; 2] {
+        let both: Vec<[f64; 2]> = (0..=CELLS).into_par_iter().map(|i| f(cosine(i as f64, alpha).max(LEAST))).collect();
+        [0, 1].map(|k| Self { alpha, knots: both.iter().map(|values| values[k]).collect() })
+    }
+
     /// Nothing.
     pub fn zero(alpha: f64) -> Self {
         Self { alpha, knots: vec![0.0; CELLS + 1] }
@@ -105,10 +111,25 @@ impl Curve {
 /// Mean over the facets of width `alpha` that are visible under the cosine `cos` of `f`: of the cosine on the facet,
 /// the share of what it mirrors that gets away, and the share of what it refracts into index `eta`.
 pub fn by_facets(alpha: f64, eta: f64, cos: f64, f: impl Fn(f64, f64, f64) -> f64) -> f64 {
+    let mut sum = 0.0;
+    each_facet(alpha, eta, cos, |met, up, down| sum += f(met, up, down));
+    sum / f64::from(LATTICE[0])
+}
+
+/// The same of two functions of the cosine on the facet and the share of what it mirrors that gets away.
+pub fn two_by_facets(alpha: f64, cos: f64, f: impl Fn(f64, f64) -> [f64; 2]) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    each_facet(alpha, 1.5, cos, |met, up, _| {
+        let [a, b] = f(met, up);
+        sum = [sum[0] + a, sum[1] + b];
+    });
+    sum.map(|x| x / f64::from(LATTICE[0]))
+}
+
+fn each_facet(alpha: f64, eta: f64, cos: f64, mut visit: impl FnMut(f64, f64, f64)) {
     let ggx = Ggx::new(alpha);
     let wo = [(1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos];
     let [count, step] = LATTICE;
-    let mut sum = 0.0;
     for k in 0..count {
         let second = f64::from((u64::from(k) * u64::from(step) % u64::from(count)) as u32);
         let h = ggx.visible(wo, [f64::from(k), second].map(|x| (x + 0.5) / f64::from(count)));
@@ -118,9 +139,8 @@ pub fn by_facets(alpha: f64, eta: f64, cos: f64, f: impl Fn(f64, f64, f64) -> f6
         let down_z = h[2] * (met / eta - cos_t) - wo[2] / eta;
         let down = [(1.0 - down_z * down_z).max(0.0).sqrt(), 0.0, -down_z];
         let passed = if down_z < 0.0 { ggx.masking_both(wo, down) / ggx.masking(wo) } else { 0.0 };
-        sum += f(met, if up[2] > 0.0 { kept } else { 0.0 }, passed);
+        visit(met, if up[2] > 0.0 { kept } else { 0.0 }, passed);
     }
-    sum / f64::from(count)
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::curve::{Curve, by_facets, look_up, place};
-use super::fresnel;
+use super::{fresnel, rows};
 use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
 
 /// Tables that are kept from picture to picture.
@@ -89,8 +89,11 @@ impl Rough {
 }
 
 impl FacetsList {
-    /// Those of `list`, in this order.
-    pub fn new(list: &[Rough]) -> Self {
+    /// Those of `list`, in this order; also the tables for all widths, if `of_all_widths`.
+    pub fn new(list: &[Rough], of_all_widths: bool) -> Self {
+        if of_all_widths {
+            rows::prepare();
+        }
         static KEPT: Mutex<Option<HashMap<[u64; 9], Arc<Facets>>>> = Mutex::new(None);
         let kept = |key: &[u64; 9]| {
             let guard = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
@@ -164,7 +167,7 @@ impl Facets {
 }
 
 /// Share of light that perfectly mirroring facets of width `alpha` do not give back at once, by the cosine.
-pub fn lost(alpha: f64) -> Curve {
+fn lost(alpha: f64) -> Curve {
     Curve::new(alpha, |cos| (1.0 - by_facets(alpha, 1.5, cos, |_, up, _| up)).max(0.0))
 }
 

@@ -3,7 +3,8 @@
 //! Source: Khronos Group, "glTF 2.0 Specification", appendix B, and the extensions KHR_materials_ior and
 //! KHR_materials_transmission; Schlick's Fresnel term, GGX with height-correlated masking. Of the couplings that
 //! appendix discusses ours keeps all light: what facets throw at each other comes back (see [`super::facets`]), and the
-//! base gets what they do not reflect at all, as C. Kelemen and L. Szirmay-Kalos have it (2001).
+//! base gets what they do not reflect at all, as C. Kelemen and L. Szirmay-Kalos have it (2001). Metal and coat are
+//! blended as wholes, as the appendix defines it; its sample code lets the metal's reflectance dim the base besides.
 
 use std::f64::consts::FRAC_1_PI;
 
@@ -25,6 +26,9 @@ pub struct MetalRough<V> {
     /// Reflectance at normal incidence, and of light that many facets have thrown at each other.
     f0: Lanes3<V>,
     many: Lanes3<V>,
+    /// The same of the coat alone.
+    coat_f0: V,
+    coat_many: V,
     ggx: Ggx<V>,
     rows: PacketRows<V>,
 }
@@ -33,10 +37,11 @@ pub struct MetalRough<V> {
 struct Albedo<V> {
     /// Of facets that mirror all, what they lose.
     lost: V,
-    /// What comes back from one facet.
+    /// What comes back from one facet, and from one of the coat.
     once: Lanes3<V>,
-    /// What facets do not reflect at all.
-    under: Lanes3<V>,
+    coat_once: V,
+    /// What facets of the coat do not reflect at all.
+    under: V,
 }
 
 /// Chances of the lobes: of facets and as wide as Lambert's, above and below.
@@ -51,9 +56,10 @@ impl<V: Lanes> MetalRough<V> {
     #[inline(always)]
     fn albedo(&self, lost: V, fifth: V) -> Albedo<V> {
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
-        let once = self.f0.map(|f| f * (one - lost) + (one - f) * fifth);
-        let under = [0, 1, 2].map(|c| (one - once[c] - lost * self.many[c]).fast_max(zero));
-        Albedo { lost, once, under }
+        let once = |f: V| f * (one - lost) + (one - f) * fifth;
+        let coat_once = once(self.coat_f0);
+        let under = (one - coat_once - lost * self.coat_many).fast_max(zero);
+        Albedo { lost, once: self.f0.map(once), coat_once, under }
     }
 
     #[inline(always)]
@@ -64,11 +70,11 @@ impl<V: Lanes> MetalRough<V> {
     #[inline(always)]
     fn chances(&self, out: &Albedo<V>) -> Chances<V> {
         let one = V::constant(1.0);
-        let part = |f: &dyn Fn(usize) -> V| brightness([f(0), f(1), f(2)]);
         let facets = brightness(out.once);
-        let wide = part(&|c| self.many[c].mul_add(out.lost, self.diffuse[c] * out.under[c]));
-        let facets_below = part(&|c| (one - out.lost - out.once[c]) * self.through[c]);
-        let wide_below = part(&|c| (one - self.many[c]) * out.lost * self.through[c]);
+        let wide = brightness(self.many) * out.lost + brightness(self.diffuse) * out.under;
+        let through = brightness(self.through);
+        let facets_below = (one - out.lost - out.coat_once).fast_max(V::constant(0.0)) * through;
+        let wide_below = (one - self.coat_many) * out.lost * through;
         let rcp = one / (facets + wide + facets_below + wide_below);
         Chances {
             facets: facets * rcp,
@@ -87,17 +93,18 @@ impl<V: Lanes> MetalRough<V> {
         let h = normalize(add(wo, wi));
         let cos = dot(wo, h);
         let f = fresnel::schlick(cos, self.f0);
+        let [coat, ..] = fresnel::schlick(cos, [self.coat_f0; 3]);
         let facets = self.ggx.density(h) * self.ggx.masking_both(wo, wi) / (four * wo[2]);
         let facets_pdf = self.ggx.visible_pdf(wo, h) / (four * cos);
         let lambert = wi[2] * V::constant(FRAC_1_PI);
         let into = self.albedo_at(wi[2]);
         let means = self.albedo(self.rows.means[0], self.rows.means[1]);
         let thrown = ratio(out.lost * into.lost * lambert, means.lost);
+        let base = ratio(out.under * into.under * lambert, means.under);
+        let passed = facets * (one - coat) + thrown * (one - self.coat_many);
         let value = [0, 1, 2].map(|c| {
-            let base = ratio(out.under[c] * into.under[c] * self.diffuse[c] * lambert, means.under[c]);
-            let up = facets.mul_add(f[c], thrown.mul_add(self.many[c], base));
-            let down = (facets * (one - f[c]) + thrown * (one - self.many[c])) * self.through[c];
-            V::select(above, up, down)
+            let up = facets.mul_add(f[c], thrown.mul_add(self.many[c], base * self.diffuse[c]));
+            V::select(above, up, passed * self.through[c])
         });
         let up_pdf = chances.facets.mul_add(facets_pdf, chances.wide * lambert);
         let down_pdf = chances.facets_below.mul_add(facets_pdf, chances.wide_below * lambert);
@@ -115,14 +122,16 @@ impl<V: Lanes> Bsdf<'_, V> for MetalRough<V> {
         let [metallic, alpha, f0, transmission] = [0, 1, 2, 3].map(|i| points.scalar::<V>(PARAM + i, first));
         let body = one - metallic;
         let rows = PacketRows::new(alpha);
-        let f0 = base.map(|c| metallic.mul_add(c, body * f0));
         // The mean of (1 - cos)^5 over the hemisphere, weighted by the cosine, is 1 / 21.
-        let mean = f0.map(|f| (one - f).mul_add(V::constant(1.0 / 21.0), f));
+        let many = |f: V| repeated((one - f).mul_add(V::constant(1.0 / 21.0), f), rows.means[0]);
+        let coat_many = many(f0);
         Self {
             diffuse: base.map(|c| c * body * (one - transmission)),
             through: base.map(|c| c * body * transmission),
-            f0,
-            many: mean.map(|f| repeated(f, rows.means[0])),
+            f0: base.map(|c| metallic.mul_add(c, body * f0)),
+            many: base.map(|c| metallic.mul_add(many(c), body * coat_many)),
+            coat_f0: f0,
+            coat_many,
             ggx: Ggx::new(alpha),
             rows,
         }

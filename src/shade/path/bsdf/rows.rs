@@ -1,9 +1,8 @@
 //! Albedos of facets of every width, for materials whose roughness a texture changes.
 
-use std::sync::LazyLock;
+use std::sync::OnceLock;
 
-use super::curve::{Curve, by_facets, look_up, place};
-use super::facets::lost;
+use super::curve::{Curve, look_up, place, two_by_facets};
 use crate::lanes::{Lanes, MAX_LANES, Real};
 
 /// Rows of the table, evenly spaced in the square root of the width up to 1; the first is at one step.
@@ -19,16 +18,27 @@ struct Row {
     means: [f64; 2],
 }
 
-static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
-    let row = |i: usize| {
-        let alpha = ((i + 1) as f64 / ROWS as f64).powi(2);
-        let lost = lost(alpha);
-        let fifth = Curve::new(alpha, |cos| by_facets(alpha, 1.5, cos, |met, up, _| (1.0 - met).max(0.0).powi(5) * up));
-        let means = [lost.mean(), fifth.mean()];
-        Row { lost, fifth, means }
-    };
-    (0..ROWS).map(row).collect()
-});
+static TABLE: OnceLock<Vec<Row>> = OnceLock::new();
+
+/// Makes the table, which must be there before a packet asks. Nobody waits for another who makes it: one who waits inside
+/// a pool of threads might be the one who is waited for.
+pub fn prepare() {
+    if TABLE.get().is_none() {
+        let rows = (0..ROWS).map(row).collect();
+        // Another may have been faster with the same numbers.
+        let _ = TABLE.set(rows);
+    }
+}
+
+fn row(i: usize) -> Row {
+    let alpha = ((i + 1) as f64 / ROWS as f64).powi(2);
+    let [lost, fifth] = Curve::pair(alpha, |cos| {
+        let [kept, fifth] = two_by_facets(alpha, cos, |met, up| [up, (1.0 - met).max(0.0).powi(5) * up]);
+        [(1.0 - kept).max(0.0), fifth]
+    });
+    let means = [lost.mean(), fifth.mean()];
+    Row { lost, fifth, means }
+}
 
 /// Two rows and the way between them, for each lane.
 pub struct PacketRows<V> {
@@ -43,7 +53,7 @@ impl<V: Lanes> PacketRows<V> {
     /// Of facets of width `alpha`.
     #[inline(always)]
     pub fn new(alpha: V) -> Self {
-        let table = &*TABLE;
+        let table = TABLE.get().expect("the table is prepared before paths start");
         let mut widths = [V::Scalar::ONE; MAX_LANES];
         alpha.store(&mut widths);
         let mut rows = [[&table[0]; 2]; MAX_LANES];
@@ -89,11 +99,13 @@ impl<V: Lanes> PacketRows<V> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::curve::by_facets;
     use super::*;
 
     /// Between the rows, where the table is furthest from what it was made of, it is right to five in ten thousand.
     #[test]
     fn rows_between_rows() {
+        prepare();
         for i in 1..ROWS {
             let alpha = ((i as f64 + 0.5) / ROWS as f64).powi(2);
             let rows = PacketRows::<f64>::new(alpha);

@@ -63,7 +63,7 @@ fn all_rough() -> Vec<Rough> {
     WIDTHS.into_iter().flat_map(of_width).collect()
 }
 
-static FACETS: LazyLock<FacetsList> = LazyLock::new(|| FacetsList::new(&all_rough()));
+static FACETS: LazyLock<FacetsList> = LazyLock::new(|| FacetsList::new(&all_rough(), true));
 
 /// The number of `rough` in [`FACETS`].
 fn number(rough: &Rough) -> f64 {
