@@ -78,8 +78,8 @@ pub struct Memory {
     levels: Vec<node::Level>,
     /// For leaves of shapes.
     stack: Stack<f32>,
-    /// Leaves and instances that a tile may still visit among instances before it gives up.
-    effort: u32,
+    /// What instances that few groups meet may still cost a tile before it gives up.
+    credit: u32,
     /// Where groups start that are for the stream kernel.
     rest: Vec<usize>,
 }

@@ -43,12 +43,12 @@ struct Blocks<'a> {
 /// Instances.
 struct Instances<'a>(&'a World<f32>);
 
-/// Leaves and instances per ray after which a tile among instances gives up: what it looks at is so small that its rays
-/// have little in common, and the stream kernel takes the ones that are wanted by a leaf, not the tile.
-const EFFORT: f32 = 1.0;
+/// Groups that must meet an instance for it to pay a tile to enter it: where fewer do, what is looked at is so small that
+/// rays have little in common, and the stream kernel is the faster one.
+const WORTH: u32 = 8;
 
-/// What entering an instance costs, in leaves.
-const ENTRY: u32 = 2;
+/// Groups that may be missing to that before a tile gives up: a few per cent of what the stream kernel then takes.
+const CREDIT: u32 = 64;
 
 /// Traces the `N` sets that are loaded in `memory` through the world. False if it gave up.
 #[inline(always)]
@@ -67,9 +67,9 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
         let margin = place::margin(exact.world, frame);
         let planes = Planes::of(&memory.groups, frame, margin);
         let view = View { tree: &exact.world.top, planes, space: space(margin), first: 0 };
-        memory.effort = (EFFORT * (groups.count_ones() * V::N as u32) as f32) as u32;
+        memory.credit = CREDIT;
         descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &Instances(exact.world), groups, counters);
-        if memory.effort == 0 {
+        if memory.credit == 0 {
             return false;
         }
     } else {
@@ -216,10 +216,7 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
         }
         let block = &self.object.triangles[leaf.index as usize];
         match self.place {
-            Some(place) if !EXACT => {
-                memory.effort = memory.effort.saturating_sub(1);
-                memory.batch.push_placed::<ANY>(block, leaf.index * 8, count, groups, place);
-            }
+            Some(place) if !EXACT => memory.batch.push_placed::<ANY>(block, leaf.index * 8, count, groups, place),
             _ => memory.batch.push::<EXACT>(block, leaf.index * 8, count, groups),
         }
     }
@@ -240,8 +237,8 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
 
     #[inline(always)]
     fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters) {
-        memory.effort = memory.effort.saturating_sub(ENTRY);
-        if memory.effort == 0 {
+        memory.credit = (memory.credit + groups.count_ones()).saturating_sub(WORTH);
+        if memory.credit == 0 {
             // Nothing is wanted any more: the way ends here.
             memory.groups.farthest = f32::NEG_INFINITY;
             return;
