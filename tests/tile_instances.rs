@@ -73,7 +73,7 @@ fn pictures_and_shadows_are_explained() {
         }
     }
     println!("{primaries} primary rays, {seconds} shadow rays");
-    assert!(seconds > 30_000);
+    assert!(seconds > 20_000);
 }
 
 /// Some answers must come from tiles, not from the kernel they hand rays to.
@@ -180,7 +180,7 @@ fn ties_go_to_the_smaller_instance() {
         let found = (0..rays.len()).filter(|&i| hits.is_hit(i)).map(|i| hits.inst[i]);
         seen += found.inspect(|&inst| assert!(inst < 6, "instance {inst} hides its equal")).count();
     }
-    assert!(seen > 10_000, "{seen}");
+    assert!(seen > 5_000, "{seen}");
 }
 
 /// What is too flat for f32 is left to the other kernels, and still right.

@@ -231,8 +231,10 @@ mod tests {
         }
         scene.groups[0].items = vec![item(ItemKind::Instance(24), DAffine3::IDENTITY)];
         let assembly = Assembly::new(&scene).unwrap();
-        for why in [Triangles::flatten(&assembly).unwrap_err(), PlacedTriangles::of(&assembly).unwrap_err()] {
-            assert!(why.contains("at most 12000000"), "{why}");
-        }
+        let why = Triangles::flatten(&assembly).unwrap_err();
+        assert!(why.contains("at most 12000000"), "{why}");
+        // Where instances are kept, each counts as one.
+        assert!(refuse_many(MAX_TRIANGLES, 3, "triangles and instances").is_ok());
+        assert!(refuse_many(MAX_TRIANGLES + 1, 3, "triangles and instances").is_err());
     }
 }

@@ -88,6 +88,7 @@ impl Curve {
     }
 
     /// The value at cosine `cos`.
+    #[cfg(test)]
     pub fn of(&self, cos: f64) -> f64 {
         look_up(place(cos, self.alpha), |_, cell, rest| self.at(cell, rest))
     }
