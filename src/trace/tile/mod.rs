@@ -132,7 +132,8 @@ fn suits(world: &World<f32>, exact: bool) -> bool {
         true => !world.kinds.shapes,
         false => {
             let steep = world.rounding.growth <= place::MOST_GROWTH;
-            !exact && steep && !world.top.nodes.is_empty() && !(world.kinds.shapes && world.is_of_shapes())
+            let of_shapes = world.kinds.shapes && world.is_of_shapes();
+            steep && !(exact || of_shapes || world.top.nodes.is_empty())
         }
     };
     shape && !world.kinds.others && world.objects.iter().all(fits)
