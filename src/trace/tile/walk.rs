@@ -47,8 +47,8 @@ struct Instances<'a>(&'a World<f32>);
 /// rays have little in common, and the stream kernel is the faster one.
 const WORTH: u32 = 8;
 
-/// Groups that may be missing to that before a tile gives up: a few per cent of what the stream kernel then takes.
-const CREDIT: u32 = 64;
+/// Groups that may be missing to that, on balance, before a tile gives up.
+const CREDIT: u32 = 16;
 
 /// Traces the `N` sets that are loaded in `memory` through the world. False if it gave up.
 #[inline(always)]
@@ -237,7 +237,7 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
 
     #[inline(always)]
     fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters) {
-        memory.credit = (memory.credit + groups.count_ones()).saturating_sub(WORTH);
+        memory.credit = (memory.credit + groups.count_ones()).saturating_sub(WORTH).min(CREDIT);
         if memory.credit == 0 {
             // Nothing is wanted any more: the way ends here.
             memory.groups.farthest = f32::NEG_INFINITY;
