@@ -114,10 +114,7 @@ fn white_facets_keep_all_light() {
             }
             for white in whites {
                 let got = many::<f32>(scatters(white, DVec3::ONE), degrees);
-                // The table of glTF's facets, for all widths, is coarse at cosines of up to three widths.
-                let is_coarse = matches!(white, Scattering::MetallicRoughness { .. }) && degrees > 0.0;
-                let close = if is_coarse { 10.0 * CLOSE } else { CLOSE };
-                near(&format!("{white:?} under {degrees}"), got, DVec3::ONE, close);
+                near(&format!("{white:?} under {degrees}"), got, DVec3::ONE, CLOSE);
             }
             // What a boundary lets through is squeezed: it is told apart by its tint.
             for ior in [1.5, 0.75] {

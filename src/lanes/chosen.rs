@@ -1,6 +1,6 @@
 //! Some lanes of a vector: their numbers, and their values one after the other.
 
-use super::{Lanes, MAX_LANES, Real};
+use super::{Lanes, Lanes3, MAX_LANES, Real, each};
 
 /// The numbers of the set bits of `bits`, in order.
 #[inline(always)]
@@ -12,6 +12,26 @@ pub fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
             lane
         })
     })
+}
+
+/// Of a list with the bits of each vector of `V`, those with any: the number of their first lane among all, and the bits.
+pub fn packets<V: Lanes>(lanes: &[u32]) -> impl Iterator<Item = (usize, u32)> {
+    let numbered = lanes.iter().enumerate().filter(|(_, bits)| **bits != 0);
+    numbered.map(|(k, &bits)| (k * V::N, bits))
+}
+
+/// Three vectors in memory, to be read lane by lane with [`at`].
+#[inline(always)]
+pub fn spill<V: Lanes>(vectors: Lanes3<V>) -> [[V::Scalar; MAX_LANES]; 3] {
+    let mut columns = [[V::Scalar::ZERO; MAX_LANES]; 3];
+    columns.iter_mut().zip(vectors).for_each(|(column, x)| x.store(column));
+    columns
+}
+
+/// Lane `lane` of what was [spilt](spill).
+#[inline(always)]
+pub fn at<S: Copy>(columns: &[[S; MAX_LANES]; 3], lane: usize) -> [S; 3] {
+    each(|axis| columns[axis][lane])
 }
 
 /// Some lanes, listed once for many vectors.

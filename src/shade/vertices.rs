@@ -8,7 +8,7 @@ use super::look::{Look, Model};
 use super::offset::position_error;
 use super::place::Place;
 use super::shader::Shader;
-use crate::lanes::chosen::lanes_of;
+use crate::lanes::chosen::{self, lanes_of};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3};
 use crate::ray::{Hits, INVALID_ID, Rays};
 use crate::scene::world::Surface;
@@ -59,8 +59,7 @@ impl<S: Real> Vertices<S> {
 
     /// Vectors of lanes in which something was met: the first ray and the lanes.
     pub fn packets(&self) -> impl Iterator<Item = (usize, u32)> {
-        let numbered = self.lanes.iter().enumerate().filter(|(_, lanes)| **lanes != 0);
-        numbered.map(|(k, &lanes)| (k * S::Wide::N, lanes))
+        chosen::packets::<S::Wide>(&self.lanes)
     }
 
     /// Field `field` of rays `first..first + N`.

@@ -10,9 +10,9 @@ use super::lights::Lamp;
 use super::sample::Sample;
 use super::shader::{Shader, Workspace};
 use super::vertices::{AMBIENT, DIFFUSE, EMISSION, ETA, MIRROR, NORMAL, POSITION, SHADING, THROUGH, Vertices};
-use crate::lanes::chosen::lanes_of;
+use crate::lanes::chosen::{at, lanes_of, spill};
 use crate::lanes::space::{add, choose, scale, times};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each};
 use crate::ray::Rays;
 use crate::scene::description::Light;
 
@@ -104,9 +104,9 @@ impl<S: Real> Shader<'_, S> {
             let nothing = [S::Wide::constant(0.0); 3];
             let emitted = choose(shines, vertices.vector(EMISSION, first), nothing);
             let value = times(carried.weight(first), add(emitted, reflected));
-            let columns = spill::<S>(value);
+            let columns = spill(value);
             for lane in lanes_of(lanes) {
-                out[carried.path[first + lane] as usize].radiance += at(&columns, lane);
+                out[carried.path[first + lane] as usize].radiance += radiance(at(&columns, lane));
             }
         }
     }
@@ -139,8 +139,8 @@ impl<S: Real> Shader<'_, S> {
                 let (dir, t_max) = lamp.segment(org);
                 shadows.push(lit, path, [org, dir, value], t_max);
             } else {
-                let columns = spill::<S>(value);
-                lanes_of(lit).for_each(|lane| out[path[lane] as usize].radiance += at(&columns, lane));
+                let columns = spill(value);
+                lanes_of(lit).for_each(|lane| out[path[lane] as usize].radiance += radiance(at(&columns, lane)));
             }
         }
         shadows.close();
@@ -192,23 +192,15 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
     work.rays.refracted += (count_mirrored..next.len()).filter(count).count() as u64;
 }
 
+fn radiance<S: Real>(color: [S; 3]) -> DVec3 {
+    DVec3::from(color.map(S::to_f64))
+}
+
 /// Directions `dir` mirrored at planes with unit normals `normal`; the length stays.
 #[inline(always)]
 fn reflect<V: Lanes>(dir: Lanes3<V>, normal: Lanes3<V>) -> Lanes3<V> {
     let along = V::constant(-2.0) * dot(dir, normal);
     each(|i| normal[i].mul_add(along, dir[i]))
-}
-
-#[inline(always)]
-fn spill<S: Real>(vector: Lanes3<S::Wide>) -> [[S; MAX_LANES]; 3] {
-    let mut columns = [[S::ZERO; MAX_LANES]; 3];
-    columns.iter_mut().zip(vector).for_each(|(column, x)| x.store(column));
-    columns
-}
-
-#[inline(always)]
-fn at<S: Real>(columns: &[[S; MAX_LANES]; 3], lane: usize) -> DVec3 {
-    DVec3::from(each(|axis| columns[axis][lane].to_f64()))
 }
 
 #[cfg(test)]

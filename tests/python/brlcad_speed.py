@@ -10,7 +10,6 @@ the same machine, all rays, the lowest and the highest that were measured; a rat
 """
 
 import argparse
-import csv
 import json
 import math
 import pathlib
@@ -127,10 +126,7 @@ def main():
         ratios = [row["over_rt"] for row in rows if row["precision"] == precision and row["result"] == "yes"]
         print(f"{precision}: geometric mean {math.prod(ratios) ** (1 / len(ratios)):.2f}, least {min(ratios):.2f}")
     if args.output:
-        with open(args.output, "w", newline="") as file:
-            writer = csv.DictWriter(file, rows[0].keys())
-            writer.writeheader()
-            writer.writerows(rows)
+        machine.write_rows(args.output, rows)
     return 0
 
 

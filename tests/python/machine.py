@@ -1,5 +1,6 @@
 """The machine that rows were measured on."""
 
+import csv
 import datetime
 import pathlib
 import platform
@@ -28,3 +29,11 @@ def now():
 def spread(values):
     """Largest minus smallest value over the median."""
     return round((max(values) - min(values)) / statistics.median(values), 4)
+
+
+def write_rows(path, rows):
+    """Writes `rows`, dictionaries with the same keys, as CSV."""
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)

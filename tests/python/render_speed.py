@@ -8,7 +8,6 @@ reading, building and writing. SCENE may be followed by options in the same word
 """
 
 import argparse
-import csv
 import json
 import pathlib
 import statistics
@@ -87,10 +86,7 @@ def main():
             print(f"{scene:40} {row['times_as_fast']:6.2f} times as fast ({row['least']} to {row['most']}), {row['psnr_db']} dB")
             rows.append(row)
     if args.output:
-        with open(args.output, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, rows[0].keys())
-            writer.writeheader()
-            writer.writerows(rows)
+        machine.write_rows(args.output, rows)
     return 0
 
 

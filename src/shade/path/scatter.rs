@@ -7,7 +7,7 @@ use super::bsdf::Bsdf;
 use super::points::{NORMAL, OFFSET, OUT, POSITION, Points, SHADING, SQUEEZE, THROUGHPUT};
 use super::wave::{Shadows, Wave};
 use crate::camera::sobol::{PixelPoints, fraction};
-use crate::lanes::chosen::Chosen;
+use crate::lanes::chosen::{Chosen, at, spill};
 use crate::lanes::space::{Frame, choose, scale, sub};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot};
 
@@ -113,20 +113,6 @@ impl<V: Lanes> Packet<V> {
         let org = [0, 1, 2].map(|i| self.normal[i].mul_add(step, self.position[i]));
         (org, zero.cmp_lt(side * local[2]))
     }
-}
-
-#[inline(always)]
-fn spill<V: Lanes>(v: Lanes3<V>) -> [Column<V::Scalar>; 3] {
-    v.map(|x| {
-        let mut column = [V::Scalar::ZERO; MAX_LANES];
-        x.store(&mut column);
-        column
-    })
-}
-
-#[inline(always)]
-fn at<S: Copy>(columns: &[Column<S>; 3], lane: usize) -> [S; 3] {
-    [columns[0][lane], columns[1][lane], columns[2][lane]]
 }
 
 impl<S: Real> Paths<'_, S> {

@@ -1,8 +1,8 @@
 //! The rays of one bounce of many paths, with what they carry, and the shadow rays that go with them.
 
 use super::points::{BASE, FIELDS, Fields, PARAM, RAW_DIR, RAW_PLACE, RAW_TRIANGLE, SQUEEZE, THROUGHPUT};
-use crate::lanes::chosen::Chosen;
-use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real, each};
+use crate::lanes::chosen::{Chosen, at, spill};
+use crate::lanes::{Lanes, Lanes3, Real};
 use crate::ray::{Hits, Rays};
 use crate::shade::look::Look;
 
@@ -130,7 +130,6 @@ impl<S: Real> Shadows<S> {
 /// Adds the lanes `chosen` of `vectors`.
 #[inline(always)]
 fn extend<S: Real>(list: &mut Vec<[S; 3]>, chosen: &Chosen, vectors: Lanes3<S::Wide>) {
-    let mut columns = [[S::ZERO; MAX_LANES]; 3];
-    columns.iter_mut().zip(vectors).for_each(|(column, x)| x.store(column));
-    list.extend(chosen.iter().map(|lane| each(|axis| columns[axis][lane])));
+    let columns = spill(vectors);
+    list.extend(chosen.iter().map(|lane| at(&columns, lane)));
 }

@@ -8,6 +8,7 @@ use super::level::{Found, Level};
 use super::material::Finish;
 use super::shadow::Probes;
 use super::{AIR, AMBIENT, MAX_BOUNCES, Memory, Path, Rt, TOLERANCE, Within};
+use crate::lanes::chosen::{at, lanes_of, packets, spill};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, space};
 use crate::shade::sample::Sample;
 use crate::shade::shader::{Shader, Workspace};
@@ -43,12 +44,6 @@ impl<S: Real> Meetings<S> {
     }
 }
 
-/// Vectors of lanes in which something is met: the first ray and the lanes.
-fn packets<S: Real>(lanes: &[u32]) -> impl Iterator<Item = (usize, u32)> {
-    let numbered = lanes.iter().enumerate().filter(|(_, lanes)| **lanes != 0);
-    numbered.map(|(k, &lanes)| (k * S::Wide::N, lanes))
-}
-
 #[inline(always)]
 fn vector<S: Real>(from: &[Vec<S>; 3], first: usize) -> Lanes3<S::Wide> {
     [S::Wide::load(&from[0][first..]), S::Wide::load(&from[1][first..]), S::Wide::load(&from[2][first..])]
@@ -69,10 +64,8 @@ impl<V: Lanes> Finishes<V> {
     #[inline(always)]
     fn of(rt: &Rt, region: &[u32], lanes: u32) -> Self {
         let mut columns = [[V::Scalar::ZERO; MAX_LANES]; 3];
-        let (mut transmits, mut with, mut left) = (0, 0, lanes);
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
+        let (mut transmits, mut with) = (0, 0);
+        for lane in lanes_of(lanes) {
             let Some(finish) = &rt.materials[region[lane] as usize].finish else { continue };
             with |= 1 << lane;
             transmits |= u32::from(finish.transmit > 0.0) << lane;
@@ -107,10 +100,9 @@ impl<S: Real> Shader<'_, S> {
             }
             light(rt, lamp, level, found, meetings);
         }
-        for (first, mut lanes) in packets::<S>(&meetings.lanes) {
-            while lanes != 0 {
-                let i = first + lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
+        for (first, lanes) in packets::<S::Wide>(&meetings.lanes) {
+            for lane in lanes_of(lanes) {
+                let i = first + lane;
                 let color = DVec3::from(each(|axis| meetings.color[axis][i].to_f64()));
                 let shown = match &rt.materials[found.region[i] as usize].finish {
                     Some(finish) if finish.reflect > 0.0 || finish.transmit > 0.0 => {
@@ -129,7 +121,7 @@ impl<S: Real> Shader<'_, S> {
 /// What surfaces show without lights: ambient light, their own light, or a pattern as it is.
 fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
     let Meetings { lanes, base, color, .. } = meetings;
-    for (first, mut lanes) in packets::<S>(lanes) {
+    for (first, lanes) in packets::<S::Wide>(lanes) {
         let (normal, dir) = (vector(&found.normal, first), vector(&level.rays.dir, first));
         let zero = S::Wide::constant(0.0);
         let facing = zero - dot(normal, dir);
@@ -137,9 +129,7 @@ fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Me
         for axis in 0..3 {
             (S::Wide::load(&base[axis][first..]) * ambient).store(&mut color[axis][first..]);
         }
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
+        for lane in lanes_of(lanes) {
             let (i, region) = (first + lane, found.region[first + lane]);
             let material = &rt.materials[region as usize];
             if !material.is_light && material.finish.is_some() {
@@ -172,21 +162,13 @@ fn towards<S: Real>(
 /// Shadow rays from the meetings to `lamp`.
 fn aim<S: Real>(rt: &Rt, lamp: &Lamp, found: &Found<S>, meetings: &Meetings<S>, probes: &mut Probes<S>) {
     probes.open(found.t.len());
-    for (first, lanes) in packets::<S>(&meetings.lanes) {
+    for (first, lanes) in packets::<S::Wide>(&meetings.lanes) {
         let finishes = Finishes::of(rt, &found.region[first..], lanes);
-        let (to_light, mut lit) = towards(lamp, found, &finishes, first);
-        let (mut org, mut dir) = ([[S::ZERO; MAX_LANES]; 3], [[S::ZERO; MAX_LANES]; 3]);
-        for axis in 0..3 {
-            let position = S::Wide::load(&found.position[axis][first..]);
-            to_light[axis].mul_add(S::Wide::constant(TOLERANCE), position).store(&mut org[axis]);
-            to_light[axis].store(&mut dir[axis]);
-        }
-        while lit != 0 {
-            let lane = lit.trailing_zeros() as usize;
-            lit &= lit - 1;
-            let pick = |from: &[[S; MAX_LANES]; 3]| [from[0][lane], from[1][lane], from[2][lane]];
-            probes.push((first + lane) as u32, pick(&org), pick(&dir));
-        }
+        let (to_light, lit) = towards(lamp, found, &finishes, first);
+        let position = vector(&found.position, first);
+        let org = spill(each(|axis| to_light[axis].mul_add(S::Wide::constant(TOLERANCE), position[axis])));
+        let dir = spill(to_light);
+        lanes_of(lit).for_each(|lane| probes.push((first + lane) as u32, at(&org, lane), at(&dir, lane)));
     }
 }
 
@@ -196,7 +178,7 @@ fn aim<S: Real>(rt: &Rt, lamp: &Lamp, found: &Found<S>, meetings: &Meetings<S>, 
 fn light<S: Real>(rt: &Rt, lamp: &Lamp, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
     let zero = S::Wide::constant(0.0);
     let Meetings { lanes, base, color, visible } = meetings;
-    for (first, lanes) in packets::<S>(lanes) {
+    for (first, lanes) in packets::<S::Wide>(lanes) {
         let visible = S::Wide::load(&visible[first..]);
         let lanes = lanes & zero.cmp_lt(visible).bits();
         if lanes == 0 {
