@@ -13,7 +13,7 @@ use crate::measure::rows::{Outcome, PeerRow, Row, SceneFacts};
 use crate::measure::stats::{median, paired_ratio_median, summary};
 use crate::measure::timing::{Load, Series, Tracer, Workers, interleave};
 use crate::measure::truth;
-use crate::ray::{Counters, Rays};
+use crate::ray::{Counters, Pencil, Rays};
 use crate::reference::{MARGIN_FACTOR, Oracle};
 use crate::scene::description::Description;
 use crate::scene::world::{BuildSettings, World};
@@ -86,7 +86,7 @@ pub fn scene<S: Engines>(
     for &kind in &plan.kinds {
         let rays = workers.install(|| view.rays(&world, kind))?;
         if kind == RayKind::Camera {
-            let maker = |tile: usize, rays: &mut Rays<S>| view.make(tile, rays);
+            let maker = |tile: usize, pencil: &mut Pencil, rays: &mut Rays<S>| view.make(tile, pencil, rays);
             let load = Load { batches: &convert(&rays), maker: Some(&maker) };
             subject.class(kind, load, plan.repeat, stop, report)?;
         } else {
@@ -136,7 +136,7 @@ impl<S: Engines> Subject<'_, S> {
                 return Err(Error::Interrupted);
             }
             let admission = match tracer {
-                Tracer::Engine(engine) => self.admit(engine, batches, &scalar, rays, rejected.as_deref()),
+                Tracer::Engine(engine) => self.admit(engine, load, &scalar, rays, rejected.as_deref()),
                 Tracer::Peer(peer) => self.admit_peer(peer, batches, &scalar),
             };
             entries.push(Entry {
@@ -250,7 +250,7 @@ impl<S: Engines> Subject<'_, S> {
     fn admit(
         &self,
         engine: &dyn Engine<S>,
-        batches: &[Rays<S>],
+        load: Load<'_, S>,
         scalar: &Answers<S>,
         rays: u64,
         rejected: Option<&str>,
@@ -264,9 +264,9 @@ impl<S: Engines> Subject<'_, S> {
             return Err(Box::new(Outcome::Wrong(why.into())));
         }
         let mut answers = scalar.clone();
-        self.workers.pass(engine, self.world, batches, &mut answers);
+        Tracer::Engine(engine).pass(self.workers, self.world, load, &mut answers);
         let oracle = || Cow::Borrowed(self.oracle);
-        let admitted = self.workers.install(|| truth::admit(engine, batches, scalar, &answers, oracle));
+        let admitted = self.workers.install(|| truth::admit(engine, load.batches, scalar, &answers, oracle));
         admitted.map(|agreement| (answers, agreement)).map_err(|why| Box::new(Outcome::Wrong(why)))
     }
 

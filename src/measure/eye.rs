@@ -3,11 +3,12 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::camera::{Camera, FILE_TILE, PixelRect, SubPixel, Tiling, fill_tile};
+use crate::camera::{Camera, FILE_TILE, PixelRect, SubPixel, Tiling, aim_tile, fill_tile};
 use crate::error::Result;
 use crate::lanes::Real;
 use crate::measure::raysets::{RayKind, Setting, Starts, light_for, scatter};
-use crate::ray::{Hits, Rays};
+use crate::measure::timing::Made;
+use crate::ray::{Hits, Pencil, Rays};
 use crate::scene::description::{CameraDescription, Description};
 use crate::scene::world::World;
 use crate::trace::{Engine, Engines, Scratch, engine};
@@ -60,9 +61,15 @@ impl View {
         Ok(Self { primary, starts, setting, pixels, camera: eye, tiling })
     }
 
-    /// Makes `rays` the primary rays of tile `tile`: batch `tile` of [`Self::primary`].
-    pub fn make<S: Real>(&self, tile: usize, rays: &mut Rays<S>) {
+    /// Makes the primary rays of tile `tile`, batch `tile` of [`Self::primary`]: of a camera with an eye point only where
+    /// they go, else `rays` themselves.
+    pub fn make<S: Real>(&self, tile: usize, pencil: &mut Pencil, rays: &mut Rays<S>) -> Made {
+        let whole = whole(&self.tiling);
+        if aim_tile(&self.camera, &self.tiling, tile as u32, whole, SubPixel::Anchor, pencil) {
+            return Made::Pencil;
+        }
         make(&self.camera, &self.tiling, tile as u32, rays);
+        Made::Rays
     }
 
     /// The rays of class `kind` in `world`, on the current rayon pool: a tile per batch, or as many scattered rays
@@ -91,8 +98,11 @@ fn primary_rays(camera: &Camera, tiling: &Tiling) -> Vec<Rays<f32>> {
 }
 
 fn make<S: Real>(camera: &Camera, tiling: &Tiling, tile: u32, rays: &mut Rays<S>) {
-    let whole = PixelRect { x0: 0, y0: 0, x1: tiling.width(), y1: tiling.height() };
-    fill_tile(camera, tiling, tile, whole, SubPixel::Anchor, rays);
+    fill_tile(camera, tiling, tile, whole(tiling), SubPixel::Anchor, rays);
+}
+
+fn whole(tiling: &Tiling) -> PixelRect {
+    PixelRect { x0: 0, y0: 0, x1: tiling.width(), y1: tiling.height() }
 }
 
 /// Distance from `org` along unit `dir` to the first surface; infinite if there is none.

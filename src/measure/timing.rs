@@ -19,7 +19,7 @@ use crate::lanes::{FlushDenormals, Real};
 use crate::measure::answers::Answers;
 use crate::measure::peers::Peer;
 use crate::measure::raysets::Query;
-use crate::ray::{Counters, Hits, Rays};
+use crate::ray::{Counters, Hits, Pencil, Rays};
 use crate::scene::world::World;
 use crate::trace::{Engine, Scratch};
 
@@ -121,16 +121,24 @@ impl Workers {
         maker: &Maker<'_, S>,
         out: &mut [Hits<S>],
     ) -> f64 {
-        let made: Vec<_> = self.scratches.iter().map(|_| Mutex::new(Rays::new(0))).collect();
+        let memory: Vec<Mutex<(Pencil, Rays<S>)>> = self.scratches.iter().map(|_| Mutex::default()).collect();
         let jobs = out.iter_mut().enumerate().collect();
         let seconds = self.pool.install(|| {
             self.timed(jobs, |(number, hits): &mut (usize, &mut Hits<S>), scratch| {
                 let thread = rayon::current_thread_index().unwrap_or(0);
-                let mut rays = made[thread].lock().unwrap_or_else(PoisonError::into_inner);
-                maker(*number, &mut rays);
+                let mut memory = memory[thread].lock().unwrap_or_else(PoisonError::into_inner);
+                let (pencil, rays) = &mut *memory;
+                if maker(*number, pencil, rays) == Made::Pencil {
+                    if let Tracer::Engine(engine) = tracer
+                        && engine.intersect_pencil(world, pencil, hits, scratch, None)
+                    {
+                        return;
+                    }
+                    pencil.fill(rays);
+                }
                 match tracer {
-                    Tracer::Engine(engine) => engine.intersect(world, &rays, hits, scratch, None),
-                    Tracer::Peer(peer) => peer.pack(&rays, Query::Closest).intersect(hits),
+                    Tracer::Engine(engine) => engine.intersect(world, rays, hits, scratch, None),
+                    Tracer::Peer(peer) => peer.pack(rays, Query::Closest).intersect(hits),
                 }
             })
         });
@@ -178,8 +186,17 @@ impl Workers {
     }
 }
 
-/// Makes the rays of the batch of that number, in memory that is used again and again.
-pub type Maker<'a, S> = dyn Fn(usize, &mut Rays<S>) + Sync + 'a;
+/// What a [`Maker`] made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Made {
+    /// Where rays go.
+    Pencil,
+    /// The rays.
+    Rays,
+}
+
+/// Makes the rays of the batch of that number, in one of two forms, in memory that is used again and again.
+pub type Maker<'a, S> = dyn Fn(usize, &mut Pencil, &mut Rays<S>) -> Made + Sync + 'a;
 
 /// What is traced under the clock.
 #[derive(Clone, Copy)]

@@ -3,8 +3,10 @@
 pub mod batch;
 pub mod counters;
 pub mod packet;
+pub mod pencil;
 pub mod slab;
 
 pub use batch::{Hits, INVALID_ID, Rays};
 pub use counters::Counters;
 pub use packet::{Candidate, HitPacket, Packet};
+pub use pencil::Pencil;

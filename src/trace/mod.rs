@@ -20,7 +20,7 @@ use std::marker::PhantomData;
 
 use crate::error::{Error, Result, nearest_name};
 use crate::lanes::{Lanes, Pair, Real, f32x4, f32x8, f32x16, f64x2, f64x4, f64x8};
-use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
+use crate::ray::{Counters, HitPacket, Hits, Packet, Pencil, Rays};
 use crate::scene::world::World;
 pub use all::{Stretch, stretches};
 use query::{Query, Stack};
@@ -67,6 +67,18 @@ pub trait Engine<S: Real>: Sync {
         scratch: &mut Scratch,
         counters: Option<&mut Counters>,
     );
+    /// Closest hits of rays that the engine makes itself, as [`Self::intersect`]. False if it wants them in memory; `hits`
+    /// are then unspecified.
+    fn intersect_pencil(
+        &self,
+        _world: &World<S>,
+        _pencil: &Pencil,
+        _hits: &mut Hits<S>,
+        _scratch: &mut Scratch,
+        _counters: Option<&mut Counters>,
+    ) -> bool {
+        false
+    }
     /// Whether anything lies in each ray's segment: `out` is resized to the batch's length, 1 is occluded.
     fn occluded(
         &self,

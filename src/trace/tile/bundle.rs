@@ -3,7 +3,7 @@
 use super::{GROUPS, HALF_ULP, Mask, SET, V, select};
 use crate::lanes::words::prefetch;
 use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
-use crate::ray::{Packet, Rays};
+use crate::ray::{Packet, Pencil, Rays};
 
 /// Directions and coordinates the tile's arithmetic is made for. Rays outside are left to the packet kernel.
 const TAME: (f32, f32) = (1e-15, 1e15);
@@ -29,11 +29,20 @@ pub enum At {
     One,
 }
 
-/// Rays `first..first + 16 * groups` of a batch and their common point.
+/// Where rays come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Source<'a> {
+    /// They are in memory.
+    Batch(&'a Rays<f32>),
+    /// They are made here, and their places counted from those of the ray in the middle.
+    Pencil(&'a Pencil, [f64; 2]),
+}
+
+/// Rays `first..first + 16 * groups` and their common point.
 #[derive(Debug)]
 pub struct Bundle<'a> {
-    /// The batch.
-    pub rays: &'a Rays<f32>,
+    /// The rays.
+    pub source: Source<'a>,
     /// First ray.
     pub first: usize,
     /// The common point.
@@ -49,6 +58,10 @@ pub struct Bundle<'a> {
     /// Lanes that are live, but for the packet kernel.
     pub odd: [u32; GROUPS],
 }
+
+/// Rays of pencils go at most this far to the side per unit of distance, by each axis: the frame of such a tile has the
+/// pencil's depth axis, and coordinates across it that follow the tile.
+const MOST_SHEAR: f64 = 2.0;
 
 /// Loads a vector of each of three arrays.
 #[inline(always)]
@@ -77,7 +90,7 @@ impl<'a> Bundle<'a> {
     #[inline(always)]
     pub fn find<const N: usize>(rays: &'a Rays<f32>, first: usize, any: bool) -> Option<Self> {
         let mut bundle = Self {
-            rays,
+            source: Source::Batch(rays),
             first,
             apex: [0.0; 3],
             slack: 0.0,
@@ -88,26 +101,43 @@ impl<'a> Bundle<'a> {
         };
         // Most rays without a common point show it within the first group.
         let len = std::mem::replace(&mut bundle.len, 1);
-        bundle.sort_lanes(0);
-        if bundle.tame[0] != 0 && !bundle.share(any) {
+        bundle.sort_lanes(rays, 0);
+        if bundle.tame[0] != 0 && !bundle.share(rays, any) {
             return None;
         }
         bundle.len = len;
-        bundle.sort_lanes(1);
-        bundle.share(any).then_some(bundle)
+        bundle.sort_lanes(rays, 1);
+        bundle.share(rays, any).then_some(bundle)
+    }
+
+    /// The rays of a pencil, or `None` if they go too far to the side of its axes.
+    pub fn of_pencil(pencil: &'a Pencil) -> Option<Self> {
+        let len = pencil.live.len();
+        if len == 0 || len > GROUPS {
+            return None;
+        }
+        let (first, last) = (pencil.places.of_block(0), pencil.places.of_block(len - 1));
+        let middle = [0, 1].map(|axis| 0.5 * (first[axis][0] + last[axis][15]));
+        let apex = pencil.origin.map(|x| x as f32);
+        let is_tame = apex.iter().all(|x| x.abs() <= TAME.1) && middle.iter().all(|x| x.abs() <= MOST_SHEAR);
+        let mut tame = [0; GROUPS];
+        tame.iter_mut().zip(&pencil.live).for_each(|(tame, live)| *tame = u32::from(*live));
+        let source = Source::Pencil(pencil, middle);
+        let bundle = Self { source, first: 0, apex, slack: 0.0, shared: Shared::Start, len, tame, odd: [0; GROUPS] };
+        is_tame.then_some(bundle)
     }
 
     /// Finds the common point of the groups; whether there is one.
     #[inline(always)]
-    fn share(&mut self, any: bool) -> bool {
+    fn share(&mut self, rays: &Rays<f32>, any: bool) -> bool {
         let Some(leader) = (0..self.len).find(|&g| self.tame[g] != 0) else { return false };
         let leader = self.first + leader * V::N + self.tame[leader].trailing_zeros() as usize;
-        self.apex = self.rays.org(leader);
-        if self.starts_in_apex() {
+        self.apex = rays.org(leader);
+        if self.starts_in_apex(rays) {
             return true;
         }
         let ends = if any { [At::One, At::Limit].as_slice() } else { &[] };
-        let end = ends.iter().find_map(|&at| Some((self.common_end(at, leader)?, at)));
+        let end = ends.iter().find_map(|&at| Some((self.common_end(rays, at, leader)?, at)));
         let Some(((apex, slack), at)) = end else { return false };
         (self.apex, self.slack, self.shared) = (apex, slack, Shared::End(at));
         true
@@ -128,25 +158,86 @@ impl<'a> Bundle<'a> {
         Self { first: self.first + at * V::N, len, tame, odd, ..*self }
     }
 
-    /// Where the segments of a group start.
+    /// The rays of a group and their ends.
+    #[inline(always)]
+    pub fn packet(&self, g: usize) -> (Packet<V>, V) {
+        match self.source {
+            Source::Batch(rays) => {
+                let (packet, t_max, _) = Packet::load(rays, self.first + g * V::N);
+                (packet, t_max)
+            }
+            Source::Pencil(pencil, _) => {
+                let org = map3(self.apex, V::splat);
+                let dir = pencil.directions(self.first / V::N + g).map(V::new);
+                (Packet::new(org, dir, V::constant(0.0)), V::splat(f32::INFINITY))
+            }
+        }
+    }
+
+    /// Parameters of the two ends of a group's segments.
+    #[inline(always)]
+    pub fn ends(&self, g: usize) -> [V; 2] {
+        let at = self.first + g * V::N;
+        match self.source {
+            Source::Batch(rays) => [V::load(&rays.t_min[at..]), V::load(&rays.t_max[at..])],
+            Source::Pencil(..) => [V::constant(0.0), V::splat(f32::INFINITY)],
+        }
+    }
+
+    /// The way from the common point that the rays of a group go.
+    #[inline(always)]
+    pub fn ways(&self, g: usize) -> Lanes3<V> {
+        let at = self.first + g * V::N;
+        match (self.source, self.shared) {
+            (Source::Batch(rays), Shared::Start) => load3(&rays.dir, at),
+            (Source::Batch(rays), Shared::End(_)) => {
+                let org = load3(&rays.org, at);
+                each(|a| org[a] - V::splat(self.apex[a]))
+            }
+            (Source::Pencil(pencil, _), _) => {
+                let [a, b] = pencil.places.around(at / V::N, [0.0; 2]);
+                let (a, b) = (V::new(a), V::new(b));
+                let axes = map3(pencil.axes, |axis| map3(axis, |x| V::splat(x as f32)));
+                each(|x| a.mul_add(axes[0][x], b.mul_add(axes[1][x], axes[2][x])))
+            }
+        }
+    }
+
+    /// The way of one ray.
+    #[inline(always)]
+    pub fn way(&self, g: usize, lane: usize) -> [f32; 3] {
+        match self.source {
+            Source::Batch(rays) => {
+                let ray = self.first + g * V::N + lane;
+                match self.shared {
+                    Shared::Start => rays.dir(ray),
+                    Shared::End(_) => each(|a| rays.org[a][ray] - self.apex[a]),
+                }
+            }
+            Source::Pencil(..) => map3(self.ways(g), |x| x.to_array()[lane]),
+        }
+    }
+
+    /// Where the segments of a group start, of rays in memory.
     #[inline(always)]
     pub fn starts(&self, g: usize) -> Lanes3<V> {
+        let Source::Batch(rays) = self.source else { return map3(self.apex, V::splat) };
         let at = self.first + g * V::N;
-        let (org, dir) = (load3(&self.rays.org, at), load3(&self.rays.dir, at));
-        let t_min = V::load(&self.rays.t_min[at..]);
+        let (org, dir) = (load3(&rays.org, at), load3(&rays.dir, at));
+        let t_min = V::load(&rays.t_min[at..]);
         each(|a| t_min.mul_add(dir[a], org[a]))
     }
 
     #[inline(always)]
-    fn sort_lanes(&mut self, from: usize) {
+    fn sort_lanes(&mut self, rays: &Rays<f32>, from: usize) {
         let (least, most) = (V::splat(TAME.0), V::splat(TAME.1));
         let size = |v: Lanes3<V>| v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs());
         let finite = |v: Lanes3<V>| v[0].abs().cmp_le(most) & v[1].abs().cmp_le(most) & v[2].abs().cmp_le(most);
         for g in from..self.len {
             let at = self.first + g * V::N;
-            prefetch_rays(self.rays, at + AHEAD * V::N);
-            let (org, dir) = (load3(&self.rays.org, at), load3(&self.rays.dir, at));
-            let (t_min, t_max) = (V::load(&self.rays.t_min[at..]), V::load(&self.rays.t_max[at..]));
+            prefetch_rays(rays, at + AHEAD * V::N);
+            let (org, dir) = (load3(&rays.org, at), load3(&rays.dir, at));
+            let (t_min, t_max) = (V::load(&rays.t_min[at..]), V::load(&rays.t_max[at..]));
             let tame = finite(org)
                 & finite(dir)
                 & least.cmp_le(size(dir))
@@ -154,16 +245,16 @@ impl<'a> Bundle<'a> {
                 & t_min.cmp_le(t_max);
             self.tame[g] = tame.bits();
             if self.tame[g] != V::ALL {
-                self.odd[g] = Packet::<V>::load(self.rays, at).2 & !self.tame[g];
+                self.odd[g] = Packet::<V>::load(rays, at).2 & !self.tame[g];
             }
         }
     }
 
     #[inline(always)]
-    fn starts_in_apex(&self) -> bool {
+    fn starts_in_apex(&self, rays: &Rays<f32>) -> bool {
         let apex = map3(self.apex, V::splat);
         (0..self.len).all(|g| {
-            let org = load3(&self.rays.org, self.first + g * V::N);
+            let org = load3(&rays.org, self.first + g * V::N);
             let same = org[0].cmp_eq(apex[0]) & org[1].cmp_eq(apex[1]) & org[2].cmp_eq(apex[2]);
             self.tame[g] & !same.bits() == 0
         })
@@ -171,18 +262,18 @@ impl<'a> Bundle<'a> {
 
     /// Where ray `leader` ends, and how far the others pass it, if that can be rounding: at most 64 half ulps of the
     /// largest coordinate.
-    fn common_end(&self, at: At, leader: usize) -> Option<([f32; 3], f32)> {
+    fn common_end(&self, rays: &Rays<f32>, at: At, leader: usize) -> Option<([f32; 3], f32)> {
         let parameter = match at {
             At::One => 1.0,
-            At::Limit => self.rays.t_max[leader],
+            At::Limit => rays.t_max[leader],
         };
-        let (org, dir) = (self.rays.org(leader), self.rays.dir(leader));
+        let (org, dir) = (rays.org(leader), rays.dir(leader));
         let apex = each(|a| dir[a] * parameter + org[a]);
         let (mut apart, mut size, mut fits) = (V::constant(0.0), V::constant(0.0), true);
         for g in 0..self.len {
             let first = self.first + g * V::N;
-            let (org, dir) = (load3(&self.rays.org, first), load3(&self.rays.dir, first));
-            let t_max = V::load(&self.rays.t_max[first..]);
+            let (org, dir) = (load3(&rays.org, first), load3(&rays.dir, first));
+            let t_max = V::load(&rays.t_max[first..]);
             let (t, usable) = match at {
                 At::One => (V::constant(1.0), t_max.cmp_le(V::constant(1.0))),
                 At::Limit => (t_max, t_max.cmp_le(V::splat(TAME.1)) & V::splat(TAME.0).cmp_le(t_max)),

@@ -114,7 +114,7 @@ pub fn certain_pair<const ANY: bool>(
 #[cold]
 #[inline(never)]
 pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slot: u32, lanes: u32) {
-    let (packet, t_max, _) = Packet::<V>::load(exact.bundle.rays, exact.bundle.first + g * V::N);
+    let (packet, t_max) = exact.bundle.packet(g);
     let mut hits = 0;
     let mut t = t_max;
     exact.meet(&packet, slot, lanes, |found, lanes, _| {

@@ -7,7 +7,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::bundle::{Bundle, Shared};
+use super::bundle::{Bundle, Source};
 use super::{Mask, SET, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::math::Aabb;
@@ -40,6 +40,11 @@ impl Frame {
             return None;
         }
         let scale = f32::from_bits(((127 - exponent) as u32) << 23);
+        if let Source::Pencil(pencil, [s, t]) = bundle.source {
+            let [u, v, a] = pencil.axes;
+            let axes = [each(|x| u[x] - s * a[x]), each(|x| v[x] - t * a[x]), a];
+            return Some(Self { apex, axes: map3(axes, |axis| axis.map(|x| x as f32 * scale)), scale, extent });
+        }
         let (sum, across) = Self::mean_direction::<N>(bundle, groups);
         let a = normalised(sum)?;
         let flat = |r: [f64; 3]| sub(r, a.map(|x| x * dot(r, a)));
@@ -70,13 +75,10 @@ impl Frame {
             if groups >> g & 1 == 0 || bundle.tame[g] >> lane & 1 == 0 {
                 continue;
             }
-            let ray = bundle.first + g * V::N + lane;
             used |= 1 << i;
+            let way = bundle.way(g, lane);
             for axis in 0..3 {
-                sample[axis][i] = match bundle.shared {
-                    Shared::Start => bundle.rays.dir[axis][ray],
-                    Shared::End(_) => bundle.rays.org[axis][ray] - bundle.apex[axis],
-                };
+                sample[axis][i] = way[axis];
             }
         }
         let sample = map3(sample, V::new);

@@ -1,10 +1,11 @@
 //! The rays of a tile: up to 64 groups of 16 (4x4 pixels), each ray as (s, t), its depth as 1/z between two bounds.
 
-use super::bundle::{At, Bundle, Shared, load3};
+use super::bundle::{At, Bundle, Shared, Source};
 use super::frame::Frame;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::words::{least, row_minima};
-use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
+use crate::math::Aabb;
 use crate::scene::world::World;
 
 /// Widest tile: |s| and |t| below this (83 degrees off the axis).
@@ -223,6 +224,22 @@ impl Groups {
         self.cap = least(near) * (1.0 - loose);
     }
 
+    /// About how many rays, as dense as those of the tile, a box in world space would be met by; infinite if the common
+    /// point is as close to the box as that is large.
+    #[inline(always)]
+    pub fn rays_on<const N: usize>(&self, bounds: &Aabb<f32>) -> f32 {
+        let centre = each(|a| 0.5 * (bounds.lo[a] + bounds.hi[a]) - self.frame.apex[a]);
+        let half: [f32; 3] = each(|a| 0.5 * (bounds.hi[a] - bounds.lo[a]));
+        let depth = dot(centre, self.frame.axes[2]);
+        let square = dot(half, half) * self.frame.scale * self.frame.scale;
+        if depth * depth <= square || depth <= 0.0 {
+            return f32::INFINITY;
+        }
+        let [s, t] = self.bounds.map(|[lo, hi]| hi - lo);
+        // Half of the square around the sphere around it: a guess.
+        2.0 * square / (depth * depth) * (N * SET * V::N) as f32 / (s * t)
+    }
+
     /// Relative error of depths computed from a ray's parameter.
     #[inline(always)]
     pub fn loose(&self) -> f32 {
@@ -231,16 +248,16 @@ impl Groups {
 
     #[inline(always)]
     fn lines(&self, bundle: &Bundle, g: usize) -> Lines {
-        let at = bundle.first + g * V::N;
-        let (t_min, t_max) = (V::load(&bundle.rays.t_min[at..]), V::load(&bundle.rays.t_max[at..]));
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
-        let direction: Lanes3<V> = match bundle.shared {
-            Shared::Start => load3(&bundle.rays.dir, at),
-            Shared::End(_) => {
-                let org = load3(&bundle.rays.org, at);
-                each(|a| org[a] - V::splat(bundle.apex[a]))
-            }
-        };
+        if let Source::Pencil(pencil, middle) = bundle.source {
+            let [s, t] = pencil.places.around(bundle.first / V::N + g, middle);
+            let (s, t) = (V::new(s), V::new(t));
+            let (speed, near) = (V::splat(self.frame.scale), V::splat(f32::INFINITY));
+            let fit = s.abs().cmp_lt(V::splat(WIDEST)) & t.abs().cmp_lt(V::splat(WIDEST));
+            return Lines { s, t, speed, far: zero, near, fit: fit.bits(), reach: zero };
+        }
+        let [t_min, t_max] = bundle.ends(g);
+        let direction = bundle.ways(g);
         let [x, y, speed] = self.frame.coordinates(direction);
         let slowness = one / speed;
         let (s, t) = (x * slowness, y * slowness);

@@ -15,6 +15,7 @@
 
 mod batch;
 mod bundle;
+mod engine;
 mod exact;
 mod frame;
 mod groups;
@@ -28,10 +29,9 @@ mod walk;
 
 use super::output::Output;
 use super::query::{Query, Stack};
-use super::{Engine, Generic, Scratch, stream, traverse};
-use crate::lanes::past::arrived;
+use super::{Generic, Scratch, stream, traverse};
 use crate::lanes::{Lanes, f32x16};
-use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
+use crate::ray::{Counters, HitPacket, Packet, Pencil, Rays};
 use crate::scene::world::{Object, World};
 use bundle::Bundle;
 use exact::Exact;
@@ -78,7 +78,7 @@ pub struct Memory {
     levels: Vec<node::Level>,
     /// For leaves of shapes.
     stack: Stack<f32>,
-    /// What instances that few groups meet may still cost a tile before it gives up.
+    /// What instances that are seen small may still cost a tile before it gives up.
     credit: u32,
     /// Where groups start that are for the stream kernel.
     rest: Vec<usize>,
@@ -139,15 +139,24 @@ fn suits(world: &World<f32>, exact: bool) -> bool {
     shape && !world.kinds.others && world.objects.iter().all(fits)
 }
 
-impl Job<'_> {
+impl<'a> Job<'a> {
+    fn new(
+        world: &'a World<f32>,
+        rays: &'a Rays<f32>,
+        scratch: &'a mut Scratch,
+        counters: &'a mut Counters,
+        output: Output<'a, f32>,
+        most: usize,
+    ) -> Self {
+        let Scratch { single: super::Memory { stack, stream }, tile: memory, .. } = scratch;
+        stack.reserve(world.stack_bound());
+        Self { world, rays, memory, stack, stream, counters, output, most, past: rays.len() > MANY }
+    }
+
     fn run<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self) {
         let suits = suits(self.world, EXACT);
         if suits {
-            let below = self.world.objects.iter().map(|object| object.tree.depth).max().unwrap_or(0);
-            let depth = (self.world.top.depth + below) as usize + 1;
-            if self.memory.levels.len() < depth {
-                self.memory.levels.resize(depth, node::Level::default());
-            }
+            self.make_levels();
         }
         // What one call learns must not change what another one answers.
         self.memory.slabs.forget();
@@ -178,6 +187,33 @@ impl Job<'_> {
         job.run::<V, ANY, COUNT>(starts.iter().copied());
         self.memory.rest = starts;
         self.memory.rest.clear();
+    }
+
+    /// Traces a pencil as one tile; false if that cannot be.
+    fn pencil<const EXACT: bool, const COUNT: bool>(&mut self, pencil: &Pencil) -> bool {
+        if EXACT || self.most != GROUPS || !suits(self.world, EXACT) {
+            return false;
+        }
+        let Some(bundle) = Bundle::of_pencil(pencil) else { return false };
+        self.make_levels();
+        self.memory.slabs.forget();
+        // Those without a live ray too: their misses are written.
+        let groups = u64::MAX >> (GROUPS - bundle.len);
+        let traced = match bundle.len <= SET {
+            true => self.tile::<1, false, EXACT, COUNT>(&bundle, groups),
+            false => self.tile::<SETS, false, EXACT, COUNT>(&bundle, groups),
+        };
+        let is_done = traced && self.memory.rest.is_empty();
+        self.memory.rest.clear();
+        is_done
+    }
+
+    fn make_levels(&mut self) {
+        let below = self.world.objects.iter().map(|object| object.tree.depth).max().unwrap_or(0);
+        let depth = (self.world.top.depth + below) as usize + 1;
+        if self.memory.levels.len() < depth {
+            self.memory.levels.resize(depth, node::Level::default());
+        }
     }
 
     /// Leaves `N` sets to the stream kernel.
@@ -262,17 +298,17 @@ impl Job<'_> {
         }
         if !EXACT && odd == 0 {
             if let Output::Closest(hits) = &mut self.output {
-                self.memory.groups.store_own(g, self.rays, hits, first, self.past);
+                self.memory.groups.store_own(g, exact.bundle, hits, self.past);
             }
             return;
         }
-        let (packet, t_max, _) = Packet::<V>::load(self.rays, first);
+        let (packet, t_max) = exact.bundle.packet(g);
         let mut hit = if EXACT {
             let exact::Final { hit, denied } = exact.finish(&self.memory.groups, g, &packet, t_max);
             odd |= denied;
             hit
         } else {
-            self.memory.groups.own_hits(g, self.rays, first)
+            self.memory.groups.own_hits(g, exact.bundle)
         };
         if odd != 0 {
             hit = self.rest::<ANY, COUNT>(first, odd, Some(hit)).0;
@@ -303,69 +339,5 @@ impl Job<'_> {
         let (hit, done) =
             Generic::<V, true>::packet::<ANY, COUNT>(self.world, self.rays, first, self.stack, self.counters);
         self.output.put(first, &hit, done);
-    }
-}
-
-impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn lanes(&self) -> usize {
-        self.most * V::N
-    }
-
-    fn is_exact(&self) -> bool {
-        EXACT
-    }
-
-    fn intersect(
-        &self,
-        world: &World<f32>,
-        rays: &Rays<f32>,
-        hits: &mut Hits<f32>,
-        scratch: &mut Scratch,
-        counters: Option<&mut Counters>,
-    ) {
-        hits.prepare(rays.len());
-        call::<false, EXACT>(world, rays, Output::Closest(hits), scratch, counters, self.most);
-    }
-
-    fn occluded(
-        &self,
-        world: &World<f32>,
-        rays: &Rays<f32>,
-        out: &mut Vec<u8>,
-        scratch: &mut Scratch,
-        counters: Option<&mut Counters>,
-    ) {
-        out.clear();
-        out.resize(rays.len(), 0);
-        call::<true, EXACT>(world, rays, Output::Any(out), scratch, counters, self.most);
-    }
-}
-
-fn call<const ANY: bool, const EXACT: bool>(
-    world: &World<f32>,
-    rays: &Rays<f32>,
-    output: Output<f32>,
-    scratch: &mut Scratch,
-    counters: Option<&mut Counters>,
-    most: usize,
-) {
-    let Scratch { single: super::Memory { stack, stream }, tile: memory, .. } = scratch;
-    stack.reserve(world.stack_bound());
-    let past = rays.len() > MANY;
-    match counters {
-        Some(counters) => {
-            Job { world, rays, memory, stack, stream, counters, output, most, past }.run::<ANY, EXACT, true>();
-        }
-        None => {
-            let counters = &mut Counters::default();
-            Job { world, rays, memory, stack, stream, counters, output, most, past }.run::<ANY, EXACT, false>();
-        }
-    }
-    if past {
-        arrived();
     }
 }

@@ -4,6 +4,7 @@
 use glam::DVec3;
 
 use super::batch::{Batch, Planes};
+use super::bundle::Bundle;
 use super::exact::Exact;
 use super::groups::{Groups, NO_SLOT, merge};
 use super::shapes;
@@ -11,7 +12,7 @@ use super::{Mask, V, select};
 use crate::lanes::past::store_past;
 use crate::lanes::words::{below, positions};
 use crate::lanes::{LaneMask, Lanes, each};
-use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
+use crate::ray::{HitPacket, Hits, INVALID_ID};
 use crate::shape::{Block, Triangle};
 
 /// 1/z of triangle `i` where its plane says `inverse`: not nearer and not farther than its corners.
@@ -222,7 +223,7 @@ pub fn decide<const ANY: bool, const MANY: bool>(
         shapes::enter(exact, id.inst, g)
     } else {
         block.set(0, batch.corners(i), id.prim);
-        let (packet, t_max, _) = Packet::<V>::load(exact.bundle.rays, exact.bundle.first + g * V::N);
+        let (packet, t_max) = exact.bundle.packet(g);
         (packet, t_max, exact.bundle.tame[g])
     };
     let one = V::constant(1.0);
@@ -250,10 +251,10 @@ pub fn decide<const ANY: bool, const MANY: bool>(
 impl Groups {
     /// Lanes of a group that hit something, and t, u, v there (elsewhere u and v are 0).
     #[inline(always)]
-    fn own_numbers(&self, g: usize, rays: &Rays<f32>, first: usize) -> (Mask, V, V, V) {
+    fn own_numbers(&self, g: usize, bundle: &Bundle) -> (Mask, V, V, V) {
         let found = Mask::from_bits(!positions(&self.of[g].slot, NO_SLOT));
         let one = V::constant(1.0);
-        let (t_min, t_max) = (V::load(&rays.t_min[first..]), V::load(&rays.t_max[first..]));
+        let [t_min, t_max] = bundle.ends(g);
         let t = t_min.fast_max(t_max.fast_min(one / (self.of[g].inv_lo * self.of[g].speed)));
         let [u, v, sum] = self.of[g].weights;
         let scale = one / sum;
@@ -261,10 +262,11 @@ impl Groups {
         (found, t, or_zero(u), or_zero(v))
     }
 
-    /// Writes a group's own hits and misses; `first` is its first ray. `past`: past the caches.
+    /// Writes a group's own hits and misses. `past`: past the caches.
     #[inline(always)]
-    pub fn store_own(&self, g: usize, rays: &Rays<f32>, hits: &mut Hits<f32>, first: usize, past: bool) {
-        let (found, t, u, v) = self.own_numbers(g, rays, first);
+    pub fn store_own(&self, g: usize, bundle: &Bundle, hits: &mut Hits<f32>, past: bool) {
+        let (found, t, u, v) = self.own_numbers(g, bundle);
+        let first = bundle.first + g * V::N;
         let store = |x: &[u32; 16], to: &mut [u32]| match to[first..].first_chunk_mut() {
             Some(to) if past => store_past(x, to),
             Some(to) => *to = *x,
@@ -283,9 +285,9 @@ impl Groups {
     }
 
     /// A group's own hits for the packet kernel to go on with.
-    pub fn own_hits(&self, g: usize, rays: &Rays<f32>, first: usize) -> HitPacket<V> {
-        let (found, t, u, v) = self.own_numbers(g, rays, first);
-        let mut hit = HitPacket::new(select(found, t, V::load(&rays.t_max[first..])));
+    pub fn own_hits(&self, g: usize, bundle: &Bundle) -> HitPacket<V> {
+        let (found, t, u, v) = self.own_numbers(g, bundle);
+        let mut hit = HitPacket::new(select(found, t, bundle.ends(g)[1]));
         (hit.u, hit.v, hit.prim) = (u, v, self.of[g].slot);
         hit.inst = match self.many {
             true => self.inst[g],

@@ -18,7 +18,7 @@ use crate::trace::query::{Query, Stack};
 /// The rays of a group in the space of an instance, their ends, and the lanes that are traced and meet its box.
 #[inline(always)]
 pub fn enter(exact: &Exact, inst: u32, g: usize) -> (Packet<V>, V, u32) {
-    let (packet, t_max, _) = Packet::<V>::load(exact.bundle.rays, exact.bundle.first + g * V::N);
+    let (packet, t_max) = exact.bundle.packet(g);
     let (instance, tame) = (&exact.world.instances[inst as usize], exact.bundle.tame[g]);
     if instance.identity {
         return (packet, t_max, tame);

@@ -5,7 +5,7 @@
 //! tests that found nothing and shrinks with box tests that culled nothing, and carries over from tile to tile. It
 //! decides about time only, never about an answer.
 
-use super::bundle::{Bundle, Shared, load3};
+use super::bundle::Bundle;
 use super::groups::Groups;
 use super::{GROUPS, HALF_ULP, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
@@ -122,17 +122,10 @@ impl Slopes {
         while missing != 0 {
             let g = missing.trailing_zeros() as usize & (GROUPS - 1);
             missing &= missing - 1;
-            let at = bundle.first + g * V::N;
-            let direction = match bundle.shared {
-                Shared::Start => load3(&bundle.rays.dir, at),
-                Shared::End(_) => {
-                    let org = load3(&bundle.rays.org, at);
-                    each(|a| org[a] - V::splat(groups.frame.apex[a]))
-                }
-            };
+            let way = bundle.ways(g);
             let direction = match space.to_local {
-                Some(map) => map.vectors(direction),
-                None => direction,
+                Some(map) => map.vectors(way),
+                None => way,
             };
             let per_depth = V::constant(1.0) / groups.of[g].speed;
             self.per_axis[g] = map3(direction, |d| {

@@ -13,7 +13,8 @@ use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::Lanes;
 use crate::lanes::words::{least_key, prefetch};
 use crate::ray::Counters;
-use crate::scene::world::{Class, Object, World};
+use crate::scene::world::{Class, Instance, Object, World};
+use crate::shape::BLOCK;
 
 /// A tree as a tile sees it.
 struct View<'a> {
@@ -43,12 +44,15 @@ struct Blocks<'a> {
 /// Instances.
 struct Instances<'a>(&'a World<f32>);
 
-/// Groups that must meet an instance for it to pay a tile to enter it: where fewer do, what is looked at is so small that
-/// rays have little in common, and the stream kernel is the faster one.
-const WORTH: u32 = 8;
+/// Triangles per ray from which on an instance is seen so small that its triangles have few rays in common: the stream
+/// kernel is the faster one.
+const FINE: f32 = 24.0;
 
-/// Groups that may be missing to that, on balance, before a tile gives up.
-const CREDIT: u32 = 16;
+/// What a visit of such an instance takes from a tile's credit; others add the groups that meet them.
+const COST: u32 = 8;
+
+/// Credit of a tile at its start, and at most. One without credit gives up.
+const CREDIT: [u32; 2] = [16, 64];
 
 /// Traces the `N` sets that are loaded in `memory` through the world. False if it gave up.
 #[inline(always)]
@@ -67,7 +71,7 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
         let margin = place::margin(exact.world, frame);
         let planes = Planes::of(&memory.groups, frame, margin);
         let view = View { tree: &exact.world.top, planes, space: space(margin), first: 0 };
-        memory.credit = CREDIT;
+        memory.credit = CREDIT[0];
         descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &Instances(exact.world), groups, counters);
         if memory.credit == 0 {
             return false;
@@ -237,14 +241,21 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
 
     #[inline(always)]
     fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters) {
-        memory.credit = (memory.credit + groups.count_ones()).saturating_sub(WORTH).min(CREDIT);
+        let world = self.0;
+        let inst = world.top_leaves[leaf.index as usize];
+        let Instance { object, bounds, .. } = &world.instances[inst as usize];
+        let triangles = (world.objects[*object as usize].triangles.len() * BLOCK) as f32;
+        memory.credit = match triangles <= FINE * memory.groups.rays_on::<N>(bounds) {
+            true => (memory.credit + groups.count_ones()).min(CREDIT[1]),
+            false => memory.credit.saturating_sub(COST),
+        };
         if memory.credit == 0 {
             // Nothing is wanted any more: the way ends here.
             memory.groups.farthest = f32::NEG_INFINITY;
             return;
         }
-        let (world, state) = (self.0, &memory.groups);
-        let place = Place::new(world, world.top_leaves[leaf.index as usize], &state.frame);
+        let state = &memory.groups;
+        let place = Place::new(world, inst, &state.frame);
         let planes = Planes::of(state, &place.frame, node::MARGIN * HALF_ULP * place.frame.extent);
         let space = place.space(world, state.slack / state.frame.scale);
         let view = View { tree: &place.object.tree, planes, space, first: world.top.depth as usize };

@@ -1,0 +1,86 @@
+//! The engine as others see it.
+
+use super::{Job, MANY, Tile};
+use crate::lanes::past::arrived;
+use crate::lanes::{Lanes, f32x16};
+use crate::ray::{Counters, Hits, Pencil, Rays};
+use crate::scene::world::World;
+use crate::trace::output::Output;
+use crate::trace::{Engine, Scratch};
+
+impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn lanes(&self) -> usize {
+        self.most * f32x16::N
+    }
+
+    fn is_exact(&self) -> bool {
+        EXACT
+    }
+
+    fn intersect(
+        &self,
+        world: &World<f32>,
+        rays: &Rays<f32>,
+        hits: &mut Hits<f32>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    ) {
+        hits.prepare(rays.len());
+        call::<false, EXACT>(world, rays, Output::Closest(hits), scratch, counters, self.most);
+    }
+
+    fn intersect_pencil(
+        &self,
+        world: &World<f32>,
+        pencil: &Pencil,
+        hits: &mut Hits<f32>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    ) -> bool {
+        hits.prepare(pencil.len());
+        let (none, output) = (&Rays::default(), Output::Closest(hits));
+        match counters {
+            Some(counters) => Job::new(world, none, scratch, counters, output, self.most).pencil::<EXACT, true>(pencil),
+            None => {
+                let counters = &mut Counters::default();
+                Job::new(world, none, scratch, counters, output, self.most).pencil::<EXACT, false>(pencil)
+            }
+        }
+    }
+
+    fn occluded(
+        &self,
+        world: &World<f32>,
+        rays: &Rays<f32>,
+        out: &mut Vec<u8>,
+        scratch: &mut Scratch,
+        counters: Option<&mut Counters>,
+    ) {
+        out.clear();
+        out.resize(rays.len(), 0);
+        call::<true, EXACT>(world, rays, Output::Any(out), scratch, counters, self.most);
+    }
+}
+
+fn call<const ANY: bool, const EXACT: bool>(
+    world: &World<f32>,
+    rays: &Rays<f32>,
+    output: Output<f32>,
+    scratch: &mut Scratch,
+    counters: Option<&mut Counters>,
+    most: usize,
+) {
+    match counters {
+        Some(counters) => Job::new(world, rays, scratch, counters, output, most).run::<ANY, EXACT, true>(),
+        None => {
+            Job::new(world, rays, scratch, &mut Counters::default(), output, most).run::<ANY, EXACT, false>();
+        }
+    }
+    if rays.len() > MANY {
+        arrived();
+    }
+}
