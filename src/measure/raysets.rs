@@ -204,6 +204,18 @@ pub struct Start {
     pub normal: DVec3,
     /// Direction of the ray that hit, not unit.
     pub dir: DVec3,
+    /// Whether it lies on an instance, whose map rounds all coordinates as much as the largest one.
+    pub is_mapped: bool,
+}
+
+impl Start {
+    /// Where rays start that leave the surface on the side of `normal`.
+    fn origin(&self, normal: DVec3) -> [f32; 3] {
+        match self.is_mapped {
+            true => offset_mapped(self.position, normal),
+            false => offset_origin(self.position, normal),
+        }
+    }
 }
 
 /// Hits of some rays (a camera's, or those of a bounce), per batch and slot; `None` where the ray misses or is dead.
@@ -261,7 +273,8 @@ fn start<S: Real>(world: &World<S>, rays: &Rays<S>, hits: &Hits<S>, i: usize) ->
     let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
     let Surface { position, ng, .. } = world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);
     let usable = position.is_finite() && ng.is_finite() && ng != DVec3::ZERO;
-    usable.then(|| Start { position, normal: if ng.dot(dir) > 0.0 { -ng } else { ng }, dir })
+    let (normal, is_mapped) = (if ng.dot(dir) > 0.0 { -ng } else { ng }, !world.is_single_object());
+    usable.then_some(Start { position, normal, dir, is_mapped })
 }
 
 /// What secondary rays depend on besides the hit.
@@ -299,7 +312,7 @@ fn secondary(kind: RayKind, at: &Start, setting: &Setting, random: [f64; 2]) -> 
         RayKind::Shadow => {
             // A surface that faces away from the light is left on its far side, as a shader would leave it.
             let normal = if (setting.light - at.position).dot(at.normal) < 0.0 { -at.normal } else { at.normal };
-            let org = offset_origin(at.position, normal);
+            let org = at.origin(normal);
             let dir = setting.light - DVec3::from_array(org.map(f64::from));
             return finite(org, dir, 1.0);
         }
@@ -307,7 +320,7 @@ fn secondary(kind: RayKind, at: &Start, setting: &Setting, random: [f64; 2]) -> 
         RayKind::Reflect => (reflect(at.dir, at.normal).normalize_or_zero(), f32::INFINITY),
         RayKind::Diffuse | RayKind::Diffuse2 | RayKind::Diffuse3 => (cosine(), f32::INFINITY),
     };
-    finite(offset_origin(at.position, at.normal), dir, t_max)
+    finite(at.origin(at.normal), dir, t_max)
 }
 
 fn finite(org: [f32; 3], dir: DVec3, t_max: f32) -> Option<([f32; 3], [f32; 3], f32)> {
@@ -318,6 +331,12 @@ fn finite(org: [f32; 3], dir: DVec3, t_max: f32) -> Option<([f32; 3], [f32; 3], 
 /// `dir` mirrored about the plane with unit normal `normal`.
 fn reflect(dir: DVec3, normal: DVec3) -> DVec3 {
     dir - normal * (2.0 * dir.dot(normal))
+}
+
+/// As [`offset_origin`], by 256 roundings of the largest coordinate along the whole normal.
+fn offset_mapped(position: DVec3, normal: DVec3) -> [f32; 3] {
+    let size = position.abs().max_element().max(1.0 / 32.0);
+    (position + normal * (256.0 * f64::from(f32::EPSILON) * size)).as_vec3().to_array()
 }
 
 /// The point moved off its surface towards `normal`, far enough that the f32 rounding of a hit cannot put it on the

@@ -1,7 +1,7 @@
 use super::*;
 
 fn at(position: [f64; 3], normal: [f64; 3], dir: [f64; 3]) -> Start {
-    Start { position: position.into(), normal: normal.into(), dir: dir.into() }
+    Start { position: position.into(), normal: normal.into(), dir: dir.into(), is_mapped: false }
 }
 
 fn setting() -> Setting {
@@ -131,6 +131,16 @@ fn origins_leave_along_the_normal_by_a_step_that_grows_with_the_coordinate() {
     assert_eq!(moved, [1000.0 + 1.0 / 64.0, -1000.0 + 1.0 / 64.0, 1.0 / 65536.0]);
     let back = offset_origin(DVec3::new(1000.0, 0.0, 0.0), DVec3::new(-1.0, 0.0, 0.0));
     assert_eq!(back, [1000.0 - 1.0 / 64.0, 0.0, 0.0]);
+}
+
+/// On an instance 1000 moves y as far as x: its map may turn one into the other.
+#[test]
+fn origins_on_instances_leave_by_the_largest_coordinate() {
+    let start = Start { is_mapped: true, ..at([1000.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]) };
+    let step = 256.0 * f64::from(f32::EPSILON) * 1000.0;
+    assert_eq!(start.origin(start.normal), [1000.0, step as f32, 0.0]);
+    let (org, ..) = secondary(RayKind::Diffuse, &start, &setting(), [0.5; 2]).unwrap();
+    assert_eq!(org, start.origin(start.normal));
 }
 
 #[test]

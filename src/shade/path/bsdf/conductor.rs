@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_PI;
 use super::facets::{FacetsList, PacketFacets};
 use super::ggx::Ggx;
 use super::matte::infinity;
-use super::warp::cosine;
+use super::warp::{grazing, grazing_pdf};
 use super::{Bsdf, Sampled, Value, fresnel, mirrored, none, only, ratio};
 use crate::lanes::space::{add, choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
@@ -79,14 +79,14 @@ impl<'t, V: Lanes> Bsdf<'t, V> for RoughConductor<'t, V> {
         let wide = chance * self.facets.lost(wi[2]) * lambert;
         let reflectance = self.metal.reflectance(cos);
         let value = [0, 1, 2].map(|c| reflectance[c].mul_add(shape, self.facets.up[c] * wide));
-        let pdf = chance.mul_add(lambert - single, single);
+        let pdf = chance.mul_add(grazing_pdf(wi[2], self.facets.alpha) - single, single);
         only(V::constant(0.0).cmp_lt(wi[2]), Value { value, pdf })
     }
 
     #[inline(always)]
     fn sample(&self, wo: Lanes3<V>, place: [V; 2], choice: V) -> Sampled<V> {
         let (up, ..) = reflected(&self.ggx, wo, self.ggx.visible(wo, place));
-        let wi = choose(choice.cmp_lt(self.facets.lost(wo[2])), cosine(place), up);
+        let wi = choose(choice.cmp_lt(self.facets.lost(wo[2])), grazing(place, self.facets.alpha), up);
         let found = self.eval(wo, wi);
         Sampled { wi, weight: found.value.map(|c| ratio(c, found.pdf)), pdf: found.pdf, squeeze: V::constant(1.0) }
     }

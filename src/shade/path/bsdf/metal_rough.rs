@@ -12,7 +12,7 @@ use super::conductor::reflected;
 use super::facets::{FacetsList, repeated};
 use super::ggx::Ggx;
 use super::rows::PacketRows;
-use super::warp::cosine;
+use super::warp::{cosine, grazing, grazing_pdf};
 use super::{Bsdf, Sampled, Value, brightness, fresnel, only, ratio};
 use crate::lanes::space::{add, choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
@@ -29,6 +29,8 @@ pub struct MetalRough<V> {
     /// The same of the coat alone.
     coat_f0: V,
     coat_many: V,
+    /// Width of the facets.
+    alpha: V,
     ggx: Ggx<V>,
     rows: PacketRows<V>,
 }
@@ -44,12 +46,13 @@ struct Albedo<V> {
     under: V,
 }
 
-/// Chances of the lobes: of facets and as wide as Lambert's, above and below.
+/// Chances of the lobes: of facets, of what they throw at each other, above and below, and of the base.
 struct Chances<V> {
     facets: V,
-    wide: V,
+    thrown: V,
+    base: V,
     facets_below: V,
-    wide_below: V,
+    thrown_below: V,
 }
 
 impl<V: Lanes> MetalRough<V> {
@@ -71,16 +74,18 @@ impl<V: Lanes> MetalRough<V> {
     fn chances(&self, out: &Albedo<V>) -> Chances<V> {
         let one = V::constant(1.0);
         let facets = brightness(out.once);
-        let wide = brightness(self.many) * out.lost + brightness(self.diffuse) * out.under;
+        let thrown = brightness(self.many) * out.lost;
+        let base = brightness(self.diffuse) * out.under;
         let through = brightness(self.through);
         let facets_below = (one - out.lost - out.coat_once).fast_max(V::constant(0.0)) * through;
-        let wide_below = (one - self.coat_many) * out.lost * through;
-        let rcp = one / (facets + wide + facets_below + wide_below);
+        let thrown_below = (one - self.coat_many) * out.lost * through;
+        let rcp = one / (facets + thrown + base + facets_below + thrown_below);
         Chances {
             facets: facets * rcp,
-            wide: wide * rcp,
+            thrown: thrown * rcp,
+            base: base * rcp,
             facets_below: facets_below * rcp,
-            wide_below: wide_below * rcp,
+            thrown_below: thrown_below * rcp,
         }
     }
 
@@ -106,8 +111,9 @@ impl<V: Lanes> MetalRough<V> {
             let up = facets.mul_add(f[c], thrown.mul_add(self.many[c], base * self.diffuse[c]));
             V::select(above, up, passed * self.through[c])
         });
-        let up_pdf = chances.facets.mul_add(facets_pdf, chances.wide * lambert);
-        let down_pdf = chances.facets_below.mul_add(facets_pdf, chances.wide_below * lambert);
+        let thrown_pdf = grazing_pdf(wi[2], self.alpha);
+        let up_pdf = chances.facets.mul_add(facets_pdf, chances.thrown.mul_add(thrown_pdf, chances.base * lambert));
+        let down_pdf = chances.facets_below.mul_add(facets_pdf, chances.thrown_below * thrown_pdf);
         only(zero.cmp_lt(wi[2]), Value { value, pdf: V::select(above, up_pdf, down_pdf) })
     }
 }
@@ -132,6 +138,7 @@ impl<V: Lanes> Bsdf<'_, V> for MetalRough<V> {
             many: base.map(|c| metallic.mul_add(many(c), body * coat_many)),
             coat_f0: f0,
             coat_many,
+            alpha,
             ggx: Ggx::new(alpha),
             rows,
         }
@@ -149,10 +156,12 @@ impl<V: Lanes> Bsdf<'_, V> for MetalRough<V> {
         let out = self.albedo_at(wo[2]);
         let chances = self.chances(&out);
         let (up, ..) = reflected(&self.ggx, wo, self.ggx.visible(wo, place));
-        let above = chances.facets + chances.wide;
+        let (facets, thrown) = (chances.facets, chances.facets + chances.thrown);
+        let above = thrown + chances.base;
         let is_below = above.cmp_le(choice);
-        let is_facets = choice.cmp_lt(chances.facets) | (is_below & choice.cmp_lt(above + chances.facets_below));
-        let wi = choose(is_facets, up, cosine(place));
+        let is_facets = choice.cmp_lt(facets) | (is_below & choice.cmp_lt(above + chances.facets_below));
+        let is_base = thrown.cmp_le(choice) & choice.cmp_lt(above);
+        let wi = choose(is_facets, up, choose(is_base, cosine(place), grazing(place, self.alpha)));
         // A facet may mirror light into the surface: such a direction belongs to no lobe.
         let is_lost = wi[2].cmp_le(zero);
         let wi = [wi[0], wi[1], V::select(is_below, -wi[2], wi[2])];
