@@ -64,7 +64,8 @@ pub struct BenchArgs {
     /// Engines by name [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     engines: Vec<String>,
-    /// Other tracers to run beside them, on the same rays and threads: obvhs, embree, embree-robust
+    /// Other tracers to run beside them, on the same rays and threads: obvhs, embree, embree-robust, and with the cargo
+    /// feature `peers` bvh, parry
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Peers")]
     peers: Vec<String>,
     /// Embree 4's shared library [default: $LANECAST_EMBREE, else the usual names on the library path]
