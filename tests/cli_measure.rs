@@ -57,12 +57,14 @@ fn bench_prints_a_table_and_writes_rows_facts_and_a_picture() {
     assert_eq!(csv.lines().count(), 5, "a header, 2 classes x 2 engines: {csv}");
     assert!(csv.lines().skip(1).all(|line| line.contains(",ok,")), "{csv}");
     let facts = std::fs::read_to_string(dir.path().join("out/bench.env.txt")).expect("facts");
-    for fact in ["command: ", "cpu: ", "rustc: rustc", "load average: ", "isa compiled: "] {
+    for fact in ["command: ", "cpu: ", "rustc: rustc", "load average: ", "isa compiled: ", "ports: "] {
         assert!(facts.contains(fact), "{fact} in {facts}");
     }
     for word in ["square", "primary", "ao", "scalar", "packet8", "1.00x"] {
         assert!(table.out.contains(word), "{word} in {}", table.out);
     }
+    let said = table.err.lines().find(|line| line.starts_with("ports: ")).expect("the calibration");
+    assert!(facts.contains(said) && said.contains(" GHz: multiply") && said.contains(" per cycle"), "{said}");
 }
 
 #[test]
@@ -73,6 +75,8 @@ fn peers_are_rows_and_a_missing_one_says_so() {
     let report = run(&dir, line).json();
     let rows = report["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 10, "2 classes x (2 engines, 2 trees of obvhs, no Embree): {report}");
+    let rate = report["ports"]["multiply_add"]["per_cycle"].as_f64();
+    assert!(rate.is_some_and(|rate| (0.2..8.0).contains(&rate)), "{}", report["ports"]);
     let hits = |engine: &str, class: &str| {
         let found = rows.iter().find(|row| row["engine"] == engine && row["class"] == class);
         found.and_then(|row| row["outcome"]["timed"]["hits"].as_u64()).unwrap_or_else(|| panic!("{engine}: {report}"))

@@ -15,6 +15,7 @@ use crate::film::write_atomically;
 use crate::measure::bench::{self, Plan};
 use crate::measure::compare;
 use crate::measure::env;
+use crate::measure::explain::Ports;
 use crate::measure::history;
 use crate::measure::peers::Invitation;
 use crate::measure::raysets::RayKind;
@@ -63,7 +64,8 @@ pub struct BenchArgs {
     /// Engines by name [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     engines: Vec<String>,
-    /// Other tracers to run beside them, on the same rays and threads: obvhs, embree, embree-robust
+    /// Other tracers to run beside them, on the same rays and threads: obvhs, embree, embree-robust, and with the cargo
+    /// feature `peers` bvh, parry
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Peers")]
     peers: Vec<String>,
     /// Embree 4's shared library [default: $LANECAST_EMBREE, else the usual names on the library path]
@@ -119,6 +121,7 @@ impl BenchArgs {
 #[derive(serde::Serialize)]
 struct Report<'a> {
     run: &'a Run,
+    ports: &'a Ports,
     rows: &'a [Row],
 }
 
@@ -148,11 +151,12 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     // Peers ask for it, and then our engines get it too.
     let workers = Workers::new(args.threads.count())?.flushing(!args.peers.is_empty());
     let run = Run::now(workers.threads());
-    let facts = env::facts(workers.threads());
+    let ports = calibrated(&workers, &args.output);
+    let facts = env::facts(workers.threads(), &ports);
     let mut rows = Vec::new();
     let finished = measure(args, &workers, &mut rows);
     if args.output.json {
-        json_to_stdout(&Report { run: &run, rows: &rows })?;
+        json_to_stdout(&Report { run: &run, ports: &ports, rows: &rows })?;
     } else if !rows.is_empty() {
         to_stdout(&format!("{}{LEGEND}", rows::table(&rows)))?;
     }
@@ -176,6 +180,13 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         return Err(Error::Mismatch(format!("bench: {wrong} of {} rows have wrong hits", rows.len())));
     }
     Ok(())
+}
+
+/// What a core does in a cycle, measured and said.
+fn calibrated(workers: &Workers, output: &OutputArgs) -> Ports {
+    let ports = workers.install(Ports::measure);
+    output.say(&format!("ports: {}", ports.words()));
+    ports
 }
 
 /// All scenes; finished rows are in `rows` also when a later scene fails.

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::lanes::compiled_isa;
+use crate::measure::explain::Ports;
 
 /// Git revision of the build, 12 digits, with `-dirty` if files differed from it; `unknown` outside git.
 pub const REVISION: &str = concat!(env!("LANECAST_REVISION"), env!("LANECAST_DIRTY"));
@@ -71,7 +72,7 @@ pub fn command_line() -> String {
 }
 
 /// The facts as lines `name: value`, for the file beside the rows.
-pub fn facts(threads: usize) -> String {
+pub fn facts(threads: usize, ports: &Ports) -> String {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let from_cpuinfo = |name: &str| {
         let line = cpuinfo.lines().find(|l| l.split(':').next().is_some_and(|n| n.trim() == name));
@@ -96,6 +97,7 @@ pub fn facts(threads: usize) -> String {
         ("MHz now", from_cpuinfo("cpu MHz")),
         ("cache", from_cpuinfo("cache size")),
         ("cpu flags", from_cpuinfo("flags")),
+        ("ports", ports.words()),
         ("cores available", cores.to_string()),
         ("threads", threads.to_string()),
         ("governor", read("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")),
@@ -126,8 +128,10 @@ mod tests {
 
     #[test]
     fn facts_name_the_build() {
-        let text = facts(3);
+        let ports = Ports::measure();
+        let text = facts(3, &ports);
         assert!(text.contains(&format!("revision: {REVISION}\n")) && text.contains("threads: 3\n"), "{text}");
+        assert!(text.contains(&format!("ports: {}\n", ports.words())), "{text}");
         assert!(REVISION == "unknown" || REVISION.trim_end_matches("-dirty").chars().all(|c| c.is_ascii_hexdigit()));
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::{write, write_whole};
+use super::{calibrated, write, write_whole};
 use crate::bvh::LEAF_PRIMS;
 use crate::camera::framing;
 use crate::cli::interrupt::stopped;
@@ -32,6 +32,7 @@ pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &O
     let folder = folder.map_or_else(|| PathBuf::from(format!("experiment-{}", experiment.name)), Path::to_path_buf);
     claim(&folder, &text)?;
     output.say(&format!("{}: {}", experiment.name, experiment.question));
+    let ports = calibrated(&Workers::new(1)?, output);
     let steps = experiment.cases.len() * experiment.rays.len();
     let done = |case: &Case, class: &RayKind| place(&folder, case, *class).join("bench.csv").exists();
     let finished =
@@ -52,7 +53,7 @@ pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &O
         }
         let mut step = |rows: &[Row], class: RayKind| -> Result<()> {
             let run = Run { command: case.command(class), ..Run::now(case.threads as usize) };
-            write(&place(&folder, case, class), &run, rows, &env::facts(case.threads as usize))?;
+            write(&place(&folder, case, class), &run, rows, &env::facts(case.threads as usize, &ports))?;
             wrong += rows.iter().filter(|row| matches!(row.outcome, Outcome::Wrong(_))).count();
             measured += 1;
             bar.inc(1);

@@ -6,6 +6,7 @@
 
 mod divergence;
 mod limit;
+mod ports;
 mod share;
 mod spread;
 mod tree;
@@ -22,6 +23,7 @@ use crate::scene::world::World;
 use crate::trace::{Engine, Engines, Scratch, engine};
 
 pub use limit::{Costs, Limit, costs, is_of_triangles};
+pub use ports::{Ports, Rate};
 pub use share::Shares;
 pub use spread::Spread;
 pub use tree::{Quality, quality};

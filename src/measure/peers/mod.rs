@@ -5,8 +5,14 @@
 //! traversal of packed rays and the writing of t, u, v and primitive. A peer's own primitive numbers become ours after
 //! the clock has stopped, so that no look-up of ours is counted against it.
 
+#[cfg(feature = "peers")]
+pub mod bvh_crate;
 pub mod embree;
 pub mod obvhs;
+#[cfg(feature = "peers")]
+pub mod parry;
+#[cfg(feature = "peers")]
+mod singles;
 pub mod triangles;
 
 use std::any::Any;
@@ -22,7 +28,7 @@ use crate::scene::assembly::Assembly;
 use triangles::{PlacedTriangles, Triangles};
 
 /// What `--peers` takes.
-pub const NAMES: [&str; 3] = ["obvhs", "embree", "embree-robust"];
+pub const NAMES: [&str; 5] = ["obvhs", "embree", "embree-robust", "bvh", "parry"];
 
 /// What a row says about a peer.
 #[derive(Clone, Debug, Default)]
@@ -106,27 +112,45 @@ impl Invitation {
         if self.names.is_empty() {
             return Ok(Vec::new());
         }
-        let wanted = |obvhs: bool| self.names.iter().any(|name| (name == "obvhs") == obvhs);
-        let flat = wanted(true).then(|| Triangles::flatten(assembly));
-        let placed = wanted(false).then(|| PlacedTriangles::of(assembly).map(Arc::new));
-        let mut guests = Vec::new();
-        let mut add = |name, modes: std::result::Result<_, String>| {
-            guests.push(Guest { name, modes: modes.and_then(of_precision) });
+        let wanted = |embree: bool| self.names.iter().any(|name| name.starts_with("embree") == embree);
+        let flat = if wanted(false) { Triangles::flatten(assembly) } else { Ok(Triangles::default()) };
+        let placed = if wanted(true) { PlacedTriangles::of(assembly) } else { Ok(PlacedTriangles::default()) };
+        let placed = placed.map(Arc::new);
+        let with = |build: &(dyn Fn(&Triangles) -> Modes + Sync)| {
+            let triangles = flat.as_ref().map_err(Clone::clone)?;
+            workers.install(|| build(triangles))
         };
-        for name in &self.names {
-            let (embree, robust) = if name == "embree" { ("embree", false) } else { ("embree-robust", true) };
-            if name == "obvhs" {
-                for (family, triangles) in obvhs::NAMES.into_iter().zip(flat.iter().cycle()) {
-                    let build = |triangles| workers.install(|| obvhs::build(family, triangles));
-                    add(family, triangles.as_ref().map_err(Clone::clone).and_then(build).map(|peer| vec![peer]));
+        let mut guests = Vec::new();
+        let mut add = |name, modes: Modes| guests.push(Guest { name, modes: modes.and_then(of_precision) });
+        for name in self.names.iter().filter_map(|name| NAMES.into_iter().find(|known| known == name)) {
+            match name {
+                "obvhs" => obvhs::NAMES.into_iter().for_each(|family| {
+                    add(family, with(&|triangles| obvhs::build(family, triangles).map(|peer| vec![peer])));
+                }),
+                "embree" | "embree-robust" => {
+                    let (library, robust) = (self.embree.as_deref(), name != "embree");
+                    let open = |triangles| embree::open(library, triangles, workers.threads(), robust);
+                    add(name, placed.clone().and_then(open));
                 }
-            } else if let Some(triangles) = placed.clone() {
-                let open = |triangles| embree::open(self.embree.as_deref(), triangles, workers.threads(), robust);
-                add(embree, triangles.and_then(open));
+                _ => add(name, with(&|triangles| of_feature(name, triangles))),
             }
         }
         Ok(guests)
     }
+}
+
+/// The modes of a peer, or why there are none.
+type Modes = std::result::Result<Vec<Box<dyn Peer<f32>>>, String>;
+
+/// A peer of the cargo feature `peers`.
+#[cfg(feature = "peers")]
+fn of_feature(name: &str, triangles: &Triangles) -> Modes {
+    if name == bvh_crate::NAME { bvh_crate::build(triangles) } else { parry::build(triangles) }
+}
+
+#[cfg(not(feature = "peers"))]
+fn of_feature(_: &str, _: &Triangles) -> Modes {
+    Err("not in this build: cargo build --features peers".into())
 }
 
 /// Peers compute in f32: as peers of precision `S`, if `S` is that.

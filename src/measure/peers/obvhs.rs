@@ -3,7 +3,6 @@
 //! Source: the crate `obvhs` 0.4 (github.com/DGriffin91/obvhs, 2024); its very slow preset (pre-splits, reinsertion of every node). Triangles are
 //! stored in leaf order in the crate's form for tracing, as its examples advise, so that a leaf reads them in a row.
 
-use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 use obvhs::BvhBuildParams;
@@ -13,7 +12,7 @@ use obvhs::ray::{INVALID_ID, Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
-use super::triangles::Triangles;
+use super::triangles::{MAX_COINCIDENT, Triangles};
 use super::{Facts, Packed, Peer, rename};
 use crate::measure::raysets::Query;
 use crate::ray::{Hits, Rays};
@@ -21,17 +20,13 @@ use crate::ray::{Hits, Rays};
 /// Families: binary tree, and eight-wide tree with boxes in eight bits.
 pub const NAMES: [&str; 2] = ["obvhs-bvh2", "obvhs-cwbvh"];
 
-/// Most triangles with one and the same box centre: the builder takes time quadratic in this number and makes a chain
-/// that deep.
-pub const MAX_COINCIDENT: usize = 500;
-
 /// Builds the family called `name`.
 ///
 /// # Errors
 /// Why it cannot have these triangles.
 pub fn build(name: &'static str, triangles: &Triangles) -> Result<Box<dyn Peer<f32>>, String> {
     let list: Vec<Triangle> = (0..triangles.indices.len()).map(|i| triangle(triangles.corners(i))).collect();
-    let coincident = most_coincident(&list);
+    let coincident = triangles.most_coincident();
     if coincident > MAX_COINCIDENT {
         return Err(format!(
             "{coincident} triangles share a box centre, its builder is given at most {MAX_COINCIDENT}"
@@ -74,17 +69,6 @@ fn finish<T: Traverse>(
 fn triangle(corners: [[f32; 4]; 3]) -> Triangle {
     let [v0, v1, v2] = corners.map(|[x, y, z, _]| [x, y, z].into());
     Triangle { v0, v1, v2 }
-}
-
-/// Size of the largest group of triangles whose boxes have one centre.
-fn most_coincident(list: &[Triangle]) -> usize {
-    let mut groups: HashMap<[u32; 3], usize> = HashMap::new();
-    for triangle in list {
-        let centre = triangle.aabb().center();
-        // Adding 0 makes -0 and 0 one key.
-        *groups.entry([centre.x, centre.y, centre.z].map(|x| (x + 0.0).to_bits())).or_default() += 1;
-    }
-    groups.into_values().max().unwrap_or(0)
 }
 
 /// What the two trees have in common.

@@ -133,6 +133,27 @@ fn obvhs_finds_what_scalar_finds() {
     assert_eq!(agree(&instances(), &invitation, 1), Ok(2));
 }
 
+#[cfg(feature = "peers")]
+#[test]
+fn peers_of_the_feature_find_what_scalar_finds() {
+    for name in ["bvh", "parry"] {
+        let invitation = Invitation { names: vec![name.into()], embree: None };
+        for (scene, threads) in [(soup(), 1), (soup(), 3), (instances(), 1)] {
+            assert_eq!(agree(&scene, &invitation, threads), Ok(2), "{name}");
+        }
+    }
+}
+
+/// The name is known, the row says what to do.
+#[cfg(not(feature = "peers"))]
+#[test]
+fn peers_of_the_feature_are_not_in_this_build() {
+    for name in ["bvh", "parry"] {
+        let why = refusal::<f32>(&soup(), &[name], "");
+        assert_eq!(why, "not in this build: cargo build --features peers", "{name}");
+    }
+}
+
 #[test]
 fn every_mode_of_embree_finds_what_scalar_finds() {
     let invitation = Invitation { names: vec!["embree".into(), "embree-robust".into()], embree: None };

@@ -1,6 +1,8 @@
 //! A world's triangles, f32, as peers want them: all in world space, or, for peers that know instances, objects that are
 //! placed several times once in their own space. No shapes.
 
+use std::collections::HashMap;
+
 use glam::{DAffine3, DVec3};
 
 use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind};
@@ -10,6 +12,10 @@ use crate::shape::Triangle;
 /// Most triangles (counted once per instance, for peers without instances) and instances together that a peer is given:
 /// its trees take up to 300 bytes for each.
 pub const MAX_TRIANGLES: u64 = 12_000_000;
+
+/// Most triangles with one and the same box centre for builders that cluster neighbours (obvhs, parry's `ploc`): they take
+/// time quadratic in this number and make a chain that deep.
+pub const MAX_COINCIDENT: usize = 500;
 
 /// Indexed triangles of one space with our numbers for them. Triangles that our engines drop (no area, not finite) are
 /// left out.
@@ -60,6 +66,18 @@ impl Triangles {
                 self.ids.push([part.first_prim + i as u32, inst]);
             }
         }
+    }
+
+    /// Size of the largest group of triangles whose boxes have one centre; see [`MAX_COINCIDENT`].
+    pub fn most_coincident(&self) -> usize {
+        let mut groups: HashMap<[u32; 3], usize> = HashMap::new();
+        for i in 0..self.indices.len() {
+            let [a, b, c] = self.corners(i);
+            let middle = |k: usize| 0.5 * (a[k].min(b[k]).min(c[k]) + a[k].max(b[k]).max(c[k]));
+            // Adding 0 makes -0 and 0 one key.
+            *groups.entry([0, 1, 2].map(|k| (middle(k) + 0.0).to_bits())).or_default() += 1;
+        }
+        groups.into_values().max().unwrap_or(0)
     }
 
     /// The corners of triangle `i`.
