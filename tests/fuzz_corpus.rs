@@ -66,6 +66,20 @@ fn gltf_corpus() {
     replay("gltf", |file, bytes| gltf::parse(file, "corpus", bytes, &NO_FILES).map(|scene| scene.meshes));
 }
 
+#[test]
+fn g_corpus() {
+    use lanecast::scene::brlcad::{choose_tops, parse, regions::walk};
+    let parse = |file: &Path, bytes: &[u8]| {
+        let database = parse(file, bytes)?;
+        walk(file, &database, &choose_tops(&database, &[])?)
+    };
+    for (name, accepted) in verdicts("g", |file, bytes| parse(file, bytes).is_ok()) {
+        if name.contains('.') {
+            assert_eq!(accepted, !["cut.g", "cycle.g", "lie.g"].contains(&name.as_str()), "{name}");
+        }
+    }
+}
+
 /// Files of a corpus by whether they were accepted: each file is read by `parse`.
 fn verdicts(folder: &str, parse: impl Fn(&Path, &[u8]) -> bool) -> Vec<(String, bool)> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(folder);

@@ -60,6 +60,8 @@ const ERRORS: &[(&str, &str, &str)] = &[
     ("union { instance \"bal\" }\ndefine ball { sphere }", "1:18", "did you mean `ball`?"),
     ("define a { sphere; instance a }\nunion { instance a }", "1:29", "contains an instance of itself"),
     ("torus tube=2", "1:7", "wider than its ring"),
+    ("elliptic-torus a=0.8 b=1.2 angle=60", "1:1", "wider than its ring"),
+    ("elliptic-torus a=-1", "1:16", "must be above zero"),
     ("polyhedron { plane 1 0 0 }", "1:14", "takes four numbers"),
     ("polyhedron { plane 1 0 0 1; plane -1 0 0 1; plane 0 1 0 1; plane 0 -1 0 1 }", "1:1", "do not enclose"),
     ("ellipsoid radii=\"1, 0, 1\"", "1:11", "must be above zero"),

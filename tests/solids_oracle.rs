@@ -9,7 +9,7 @@ use lanecast::lanes::Real;
 use lanecast::ray::{Hits, Rays};
 use lanecast::reference::{EngineHit, Oracle, OracleRay, Tally};
 use lanecast::scene::description::{Description, Precision};
-use lanecast::scene::solids::SolidTree;
+use lanecast::scene::solids::{NodeKind, Placed, Solid, SolidTree};
 use lanecast::scene::world::{Preset, World};
 use lanecast::trace::{Engines, Scratch};
 use rayon::prelude::*;
@@ -83,6 +83,44 @@ fn all<S: Engines>(precision: Precision, kinds: usize, seeds: std::ops::Range<u6
 /// Trees per test and rays per tree.
 fn size() -> (u64, usize) {
     if std::env::var_os("LANECAST_LONG_TESTS").is_some() { (2000, 5000) } else { (64, 500) }
+}
+
+/// Elliptic tori of all shapes, stretched, sheared and mirrored, alone and cut by each other.
+fn elliptic_tori<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, n: usize) {
+    let tori = |seed: u64| {
+        let mut r = Random(seed);
+        let mut tree = SolidTree::new("tori");
+        let mut torus = |tree: &mut SolidTree| {
+            let solid = Solid::EllipticTorus { reach: 0.1 + 0.85 * r.unit(), lean: 1.8 * r.unit() - 0.9 };
+            let mut transform = r.affine(1.0);
+            transform.translation *= 0.25;
+            tree.solid(Placed { solid, transform })
+        };
+        let first = torus(&mut tree);
+        let kind = [NodeKind::Union, NodeKind::Difference, NodeKind::Xor];
+        if seed % 4 > 0 {
+            let second = torus(&mut tree);
+            tree.op(kind[seed as usize % 4 - 1](vec![first, second]));
+        }
+        tree
+    };
+    let tallies: Vec<Tally> =
+        seeds.into_par_iter().map(|seed| judged::<S>(&scene(tori(seed)), n, seed, precision)).collect();
+    let mut sum = Tally::default();
+    tallies.iter().for_each(|tally| sum.merge(tally));
+    println!("{precision:?}, elliptic tori: {sum}");
+    assert!(sum.hits > sum.rays / 8, "only {} of {} rays hit", sum.hits, sum.rays);
+    assert!(sum.is_clean(), "{} unexplained", sum.unexplained);
+}
+
+#[test]
+fn elliptic_tori_f64() {
+    elliptic_tori::<f64>(Precision::F64, 0..size().0, size().1);
+}
+
+#[test]
+fn elliptic_tori_f32() {
+    elliptic_tori::<f32>(Precision::F32, 0..size().0, size().1);
 }
 
 #[test]

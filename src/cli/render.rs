@@ -230,7 +230,7 @@ fn load_with(args: &RenderArgs, read: &ReadMesh<'_>) -> Result<Description> {
 fn check_rt(args: &RenderArgs, description: &Description) -> Result<()> {
     let Some(looks) = &description.looks else {
         return Err(Error::Usage(
-            "--rt-compat shows BRL-CAD databases: expected a scene file that ends in .asc".into(),
+            "--rt-compat shows BRL-CAD databases: expected a scene file that ends in .asc or .g".into(),
         ));
     };
     for (shader, region) in unknown_shaders(looks) {

@@ -33,6 +33,8 @@ pub enum Form<'a> {
     Trough([f64; 3]),
     /// Major radius 1, the tube's radius.
     Torus(f64),
+    /// Major radius 1, reach and lean of the tube's ellipse.
+    EllipticTorus([f64; 2]),
     /// Semi-axes at z = 1.
     Taper([f64; 2]),
     /// Corners of the triangles of a closed mesh, counter-clockwise seen from outside.
@@ -75,6 +77,7 @@ pub(super) enum Kind {
     Round,
     Trough,
     Torus,
+    EllipticTorus,
     Taper,
     /// Index into the solid's meshes.
     Mesh(u32),
@@ -122,6 +125,7 @@ impl<S: Real> Leaf<S> {
             Form::Round(profile) => (Kind::Round, three(profile)),
             Form::Trough(profile) => (Kind::Trough, three(profile)),
             Form::Torus(minor) => (Kind::Torus, three([minor, 0.0, 0.0])),
+            Form::EllipticTorus([reach, lean]) => (Kind::EllipticTorus, three([reach, lean, 0.0])),
             Form::Taper([x, y]) => (Kind::Taper, three([x, y, 0.0])),
             Form::Mesh(triangles) => {
                 stores.meshes.push(Arc::new(placed_mesh(triangles, &input.to_tree)));
@@ -182,6 +186,7 @@ impl<S: Real> Leaf<S> {
             Kind::Round => shape::quadric::round(o, d, p, push),
             Kind::Trough => shape::quadric::trough(o, d, p, push),
             Kind::Torus => shape::torus(o, d, p[0], push),
+            Kind::EllipticTorus => shape::elliptic_torus(o, d, [p[0], p[1]], push),
             Kind::Taper => shape::taper(o, d, [p[0], p[1]], push),
             Kind::Planes { .. } | Kind::Mesh(_) => {}
         }

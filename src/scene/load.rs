@@ -16,7 +16,7 @@ use super::{brlcad, builtin, gltf, kdl, obj, ply, stl, unpack};
 use crate::error::{Error, Result, nearest_name};
 
 /// Extensions that [`load`] reads; all but `kdl` may also be packed (`.ply.gz`, `.glb.zst`).
-pub const EXTENSIONS: [&str; 7] = ["kdl", "obj", "ply", "stl", "gltf", "glb", "asc"];
+pub const EXTENSIONS: [&str; 8] = ["kdl", "obj", "ply", "stl", "gltf", "glb", "asc", "g"];
 
 /// How to open a scene.
 #[derive(Clone, Debug, Default)]
@@ -52,7 +52,7 @@ pub fn load_with(scene: &str, options: &LoadOptions, read: &ReadMesh<'_>) -> Res
     let mut description = match extension(path)?.as_str() {
         "kdl" => scene_file(path, options, read)?,
         "gltf" | "glb" => gltf_scene(path, options)?,
-        "asc" => database(path, options)?,
+        "asc" | "g" => database(path, options)?,
         _ => mesh_scene(path, options, read)?,
     };
     description.source = Some(path.to_path_buf());
@@ -158,7 +158,9 @@ fn extension(path: &Path) -> Result<String> {
     let all: Vec<String> = EXTENSIONS.iter().map(|e| format!(".{e}")).collect();
     let what = format!("expected a scene ({}, all but .kdl also .gz or .zst) or builtin:NAME", all.join(" "));
     let error = Error::whole(path, what);
-    Err(match nearest_name(&inner, EXTENSIONS).or(nearest_name(&path.to_string_lossy(), builtin::NAMES)) {
+    // Of one letter, or of none, any other letter is near.
+    let near = if inner.len() > 1 { nearest_name(&inner, EXTENSIONS) } else { None };
+    Err(match near.or(nearest_name(&path.to_string_lossy(), builtin::NAMES)) {
         Some(near) if builtin::NAMES.contains(&near) => error.with_help(format!("did you mean `builtin:{near}`?")),
         Some(near) => error.with_help(format!("did you mean `.{near}`?")),
         None => error,

@@ -1,6 +1,8 @@
 //! What tests of BRL-CAD scenes share: where the shared data is, and a reader of NumPy's `.npz`.
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod g;
+
 use std::collections::HashMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -1,21 +1,19 @@
 //! Where a line is inside one leaf: intervals in order of t, f64.
 //!
-//! Convex shapes and quadrics as in the floor's own shapes; polyhedra by clipping; the torus by its distance function,
-//! which no expansion into powers of t can match in digits; the tapered solid by a quartic about the line's nearest
-//! point, its roots parted by those of the derivatives.
+//! Convex shapes and quadrics as in the floor's own shapes; polyhedra by clipping; tori by their distance functions; the
+//! tapered solid by a quartic about the line's nearest point, its roots parted by those of the derivatives.
 
 use glam::DVec3;
 
 use super::super::shapes;
 use super::super::spans::{self, Crossing, Span};
+use super::tori;
 use crate::scene::description::Shape;
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::{Polyhedron, Solid};
 
 /// Crossings of a mesh closer than this relative to coordinates are one.
 const SAME_EDGE: f64 = 1e-13;
-/// Intervals shorter than this (units of the canonical solid) are looked through no further.
-const FINEST: f64 = 1e-7;
 
 /// Entry and exit of each interval, in order; ends may be infinite.
 pub(super) fn intervals(solid: &Solid, org: DVec3, dir: DVec3) -> Vec<Span> {
@@ -26,7 +24,8 @@ pub(super) fn intervals(solid: &Solid, org: DVec3, dir: DVec3) -> Vec<Span> {
             _ => Vec::new(),
         },
         Solid::Polyhedron(polyhedron) => clipped(polyhedron, org, dir).into_iter().collect(),
-        Solid::Torus { minor } => torus(*minor, org, dir),
+        Solid::Torus { minor } => tori::torus(*minor, org, dir),
+        Solid::EllipticTorus { reach, lean } => tori::elliptic_torus(*reach, *lean, org, dir),
         Solid::Taper { x, y } => taper([*x, *y], org, dir),
         Solid::Round { profile } => curved(*profile, false, org, dir),
         Solid::Trough { profile } => curved(*profile, true, org, dir),
@@ -42,6 +41,7 @@ pub(super) fn normal(solid: &Solid, face: u32, p: DVec3) -> DVec3 {
         Solid::Shape(shape) => shapes::normal(*shape, face, p),
         Solid::Polyhedron(polyhedron) => polyhedron.planes().get(face as usize).map_or(DVec3::Z, |q| q.normal),
         Solid::Torus { .. } => p - DVec3::new(p.x, p.y, 0.0).normalize_or(DVec3::X),
+        Solid::EllipticTorus { reach, lean } => tori::elliptic_normal(*reach, *lean, p),
         Solid::Taper { .. } | Solid::Round { .. } | Solid::Trough { .. } if face > 0 => end(face),
         Solid::Taper { x, y } => {
             // Of (x / a)^2 + (y / b)^2 - 1.
@@ -128,43 +128,8 @@ fn curved([g0, g1, g2]: [f64; 3], drawn: bool, org: DVec3, dir: DVec3) -> Vec<Sp
     pieces.filter_map(|side| side.and(ends)).map(|s| s.moved(shift)).collect()
 }
 
-/// The torus is where the distance to its circle is at most the tube's radius. The distance changes along the line no
-/// faster than the line moves, so an interval whose middle is farther from the surface than half its length has no
-/// boundary in it.
-fn torus(minor: f64, org: DVec3, dir: DVec3) -> Vec<Span> {
-    let speed = dir.length();
-    let middle = -org.dot(dir) / (speed * speed);
-    let near = org + middle * dir;
-    let reach = 1.0 + minor + 1e-3;
-    let room = reach * reach - near.length_squared();
-    if room <= 0.0 {
-        return Vec::new();
-    }
-    let unit = dir / speed;
-    let depth = |s: f64| {
-        let p = near + s * unit;
-        (p.x.hypot(p.y) - 1.0).hypot(p.z) - minor
-    };
-    let mut roots = Vec::new();
-    let mut open = vec![(-room.sqrt(), room.sqrt())];
-    while let Some((a, b)) = open.pop() {
-        let middle = 0.5 * (a + b);
-        if depth(middle).abs() > 0.5 * (b - a) * (1.0 + 1e-9) {
-            continue;
-        }
-        if b - a > FINEST {
-            // Later parts first: the earlier ones come off the stack first.
-            open.extend([(middle, b), (a, middle)]);
-        } else if (depth(a) <= 0.0) != (depth(b) <= 0.0) {
-            roots.push(bisected(&depth, a, b));
-        }
-    }
-    let at = |s: f64| middle + s / speed;
-    roots.chunks_exact(2).map(|pair| Span::new(at(pair[0]), at(pair[1]), 0, 0)).collect()
-}
-
 /// The sign change of `f` between `a` and `b`.
-fn bisected(f: &impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+pub(super) fn bisected(f: &impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
     let below = f(a) <= 0.0;
     for _ in 0..200 {
         let middle = 0.5 * (a + b);
@@ -281,6 +246,29 @@ mod tests {
         );
         let placed = placed_torus(DVec3::ZERO, DVec3::Z, 2.0, 0.5).unwrap();
         assert!(matches!(placed.solid, Solid::Torus { minor } if minor == 0.25));
+    }
+
+    #[test]
+    fn elliptic_torus_by_hand() {
+        // Without lean, a torus.
+        for (org, dir) in [([-3.0, 0.1, 0.05], [1.0, 0.02, 0.01]), ([1.1, 0.0, 2.0], [0.0, 0.1, -1.0])] {
+            let round = ts(&Solid::Torus { minor: 0.25 }, org, dir);
+            close(&ts(&Solid::EllipticTorus { reach: 0.25, lean: 0.0 }, org, dir), &round);
+        }
+        // Semi-axes 0.4 and 0.2 on the diagonals: w^2 = 0.1, k = 0.6. At z = 0 the square of u is (1 - k^2) w^2.
+        let solid = Solid::EllipticTorus { reach: 0.1f64.sqrt(), lean: 0.6 };
+        let u = 0.064f64.sqrt();
+        close(&ts(&solid, [-3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), &[(2.0 - u, 2.0 + u), (4.0 - u, 4.0 + u)]);
+        // Through an end of the longer one, out along the diagonal.
+        let (half, end) = (0.5f64.sqrt(), 0.4 * 0.5f64.sqrt());
+        close(&ts(&solid, [1.0 - half, 0.0, -half], [half, 0.0, half]), &[(0.6, 1.4)]);
+        let n = normal(&solid, 0, DVec3::new(0.0, 1.0 + end, end)).normalize();
+        assert!((n - DVec3::new(0.0, half, half)).length() < 1e-12, "{n}");
+        // Reaching beyond the axis: hollow where it overlaps itself, turned inwards there.
+        let wide = Solid::EllipticTorus { reach: 1.25, lean: 0.0 };
+        close(&ts(&wide, [-3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), &[(0.75, 2.75), (3.25, 5.25)]);
+        assert!(normal(&wide, 0, DVec3::new(0.25, 0.0, 0.0)).x < 0.0);
+        assert!(normal(&wide, 0, DVec3::new(2.25, 0.0, 0.0)).x > 0.0);
     }
 
     #[test]

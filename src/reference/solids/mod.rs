@@ -2,6 +2,7 @@
 //! neighbouring ends (Roth, "Ray casting for modeling solids", 1982).
 
 mod leaf;
+mod tori;
 pub(super) mod verdict;
 
 use std::sync::Arc;
@@ -229,6 +230,7 @@ impl Leaf {
         let loss = match &self.solid {
             // The quartic knows the tube only to the digits of the ring; the taper only to those of its wide end.
             Solid::Torus { minor } => 4.0 / minor,
+            Solid::EllipticTorus { reach, lean } => 8.0 / (reach * (1.0 - lean.abs())),
             Solid::Taper { .. } => 16.0,
             Solid::Round { .. } | Solid::Trough { .. } => 4.0,
             Solid::Shape(_) | Solid::Polyhedron(_) | Solid::Mesh(_) => 1.0,

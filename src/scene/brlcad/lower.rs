@@ -34,6 +34,12 @@ pub(super) fn add(tree: &mut SolidTree, solid: &Solid, place: &DAffine3) -> Resu
             tree.solid(solids::half_space(normal, distance)?)
         }
         Solid::Tor { v, h, major, minor } => placed(tree, place, solids::torus(*v, *h, *major, *minor)?),
+        Solid::Eto { v, n, c, r, rd } => {
+            let up = c.dot(n.normalize_or_zero());
+            let out = (c.length_squared() - up * up).max(0.0).sqrt();
+            // The sense of the normal does not matter: the ellipse always rises outwards.
+            placed(tree, place, solids::elliptic_torus(*v, *n, *r, [out, up.abs()], *rd)?)
+        }
         Solid::Ehy { v, h, a, r1, r2, c } => {
             placed(tree, place, solids::elliptic_hyperboloid(*v, *h, *a, *r1, *r2, *c)?)
         }
@@ -56,7 +62,6 @@ pub(super) fn add(tree: &mut SolidTree, solid: &Solid, place: &DAffine3) -> Resu
         Solid::Bot { mode, vertices, faces } => {
             tree.solid(Placed { solid: bot::solid(*mode, vertices, faces)?, transform: *place })
         }
-        Solid::Eto { .. } => return Err(format!("the kind `{}` is not supported", solid.kind())),
     };
     Ok(node)
 }

@@ -1,4 +1,4 @@
-//! BRL-CAD databases: text of version 4 (`I ...` records) and version 5 (Tcl commands).
+//! BRL-CAD databases: text of version 4 (`I ...` records) and version 5 (Tcl commands), and the binary form of version 5.
 //!
 //! Reading gives a [`Database`]: objects with their raw parameters, nothing placed. [`regions`] then walks down from
 //! the chosen top objects: matrices multiply, colours and shaders are inherited, and each region becomes one boolean
@@ -7,6 +7,8 @@
 //! Nothing recurses over what a file says: trees of any depth are read and walked with stacks on the heap. Memory stays
 //! below 256 bytes per byte of the file while reading; a walk ends with an error at [`regions::MAX_LEAVES`].
 
+mod attributes;
+mod binary;
 mod boolean;
 mod bot;
 mod boxes;
@@ -39,13 +41,20 @@ use crate::error::Result;
 use lines::Lines;
 use tcl::Words;
 
-/// Reads the bytes of a text database; `file` is only for error messages.
+/// Reads the bytes of a database; `file` is only for error messages.
 ///
 /// # Errors
-/// At line and column: what is no record or command, numbers that are missing or not finite, trees and lists that do
+/// At line and column, or at a byte of binary ones: what is no record or command, numbers that are missing or not finite, trees and lists that do
 /// not close, matrices that are no affine map.
 pub fn parse(file: &Path, bytes: &[u8]) -> Result<Database> {
     let mut database = Database::default();
+    if binary::is_binary(bytes) {
+        binary::read(file, bytes, &mut database)?;
+        return Ok(database);
+    }
+    if let Some(error) = binary::of_version_4(file, bytes) {
+        return Err(error);
+    }
     let mut lines = Lines::new(file, bytes);
     // Comments may come first.
     let mut first = lines.clone();

@@ -221,5 +221,6 @@ fn ars(mut fields: Fields<'_>, place: Place, lines: &mut Lines<'_>, database: &m
 
 /// The error of a file that begins like no database.
 pub(super) fn not_a_database(lines: &Lines<'_>, at: usize) -> Error {
-    lines.error(at, "expected a BRL-CAD database: a line `I UNITS v4`, or `title {...}` of the newer text form")
+    let what = "expected a BRL-CAD database: a line `I UNITS v4`, `title {...}` of the newer text form, or binary data";
+    lines.error(at, what)
 }

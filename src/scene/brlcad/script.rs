@@ -1,5 +1,6 @@
 //! Text databases of version 5: Tcl commands `title`, `units`, `color`, `put` and `attr set`.
 
+use super::attributes;
 use super::boolean::{Expression, Step};
 use super::matrix;
 use super::model::{ColorRange, Combination, Database, Member, Object, ObjectKind, short};
@@ -43,7 +44,7 @@ pub(super) fn read<'a>(mut words: Words<'a>, database: &mut Database) -> Result<
                 };
                 database.add(Object { name: name.text().into_owned(), place, kind, attributes: Vec::new() });
             }
-            b"attr" => settings.extend(attributes(&words, start, &arguments)?),
+            b"attr" => settings.extend(setting(&words, start, &arguments)?),
             // Of no meaning for what is seen.
             b"find" | b"dbfind" | b"rm" => {}
             other => {
@@ -52,7 +53,11 @@ pub(super) fn read<'a>(mut words: Words<'a>, database: &mut Database) -> Result<
             }
         }
     }
-    settings.into_iter().try_for_each(|setting| apply(&words, setting, database))
+    // Whether it is a region is told to a combination before all else.
+    for regions in [true, false] {
+        settings.iter().try_for_each(|setting| apply(&words, setting, regions, database))?;
+    }
+    Ok(())
 }
 
 fn joined(words: &[Word<'_>]) -> String {
@@ -76,7 +81,7 @@ fn color(words: &Words<'_>, start: usize, arguments: &[Word<'_>]) -> Result<Colo
 }
 
 /// `attr set NAME KEY VALUE ...`.
-fn attributes<'a>(words: &Words<'a>, start: usize, arguments: &[Word<'a>]) -> Result<Option<Setting<'a>>> {
+fn setting<'a>(words: &Words<'a>, start: usize, arguments: &[Word<'a>]) -> Result<Option<Setting<'a>>> {
     let [verb, object, pairs @ ..] = arguments else {
         return Err(words.error(start, "expected `attr set NAME KEY VALUE ...`"));
     };
@@ -91,57 +96,32 @@ fn attributes<'a>(words: &Words<'a>, start: usize, arguments: &[Word<'a>]) -> Re
     Ok(Some(Setting { object: object.text().into_owned(), at: start, pairs }))
 }
 
-fn apply(words: &Words<'_>, setting: Setting<'_>, database: &mut Database) -> Result<()> {
+/// Applies a setting to its object: the pairs that make regions, or the others.
+fn apply(words: &Words<'_>, setting: &Setting<'_>, regions: bool, database: &mut Database) -> Result<()> {
+    let pairs = setting.pairs.iter().filter(|(key, _)| (key == attributes::REGION) == regions);
     if setting.object == GLOBAL {
-        database.attributes.extend(setting.pairs.into_iter().map(|(key, word)| (key, word.text().into_owned())));
+        database.attributes.extend(pairs.map(|(key, word)| (key.clone(), word.text().into_owned())));
         return Ok(());
     }
     let Some(index) = database.find(&setting.object) else {
         let what = format!("attributes of `{}`, which is defined nowhere", short(&setting.object));
         return Err(words.error(setting.at, what));
     };
-    let Object { kind, attributes, .. } = &mut database.objects[index as usize];
-    for (key, word) in setting.pairs {
+    let Object { kind, attributes: others, .. } = &mut database.objects[index as usize];
+    for (key, word) in pairs {
         if let ObjectKind::Combination(combination) = kind
-            && known(words, &key, word, combination)?
+            && attributes::set(combination, key, &word.text()).map_err(|what| words.error(word.at, what))?
         {
             continue;
         }
-        attributes.push((key, word.text().into_owned()));
+        others.push((key.clone(), word.text().into_owned()));
     }
     Ok(())
 }
 
-/// Sets what a combination's attribute means; false if it means nothing here. Of `rgb` and `color` and of `oshader` and
-/// `shader`, the later one counts, as both are names of one thing.
-fn known(words: &Words<'_>, key: &str, word: Word<'_>, combination: &mut Combination) -> Result<bool> {
-    let text = word.text();
-    let is_true = || !matches!(text.trim(), "" | "0" | "no" | "false" | "N" | "n");
-    let region = || int::<i32>(words, word, "a whole number");
-    match key {
-        "region" if is_true() => _ = combination.region.get_or_insert_default(),
-        "region" => {}
-        "region_id" => combination.region.get_or_insert_default().id = region()?,
-        "aircode" => combination.region.get_or_insert_default().air = region()?,
-        "los" => combination.region.get_or_insert_default().los = region()?,
-        "material_id" => combination.region.get_or_insert_default().material = region()?,
-        "rgb" | "color" => combination.rgb = Some(rgb(words, word)?),
-        "oshader" | "shader" => combination.shader = (!text.trim().is_empty()).then(|| text.trim().to_owned()),
-        "inherit" => combination.inherit = is_true(),
-        _ => return Ok(false),
-    }
-    Ok(true)
-}
-
 /// `r/g/b`, or three numbers with blanks between.
 fn rgb(words: &Words<'_>, word: Word<'_>) -> Result<[u8; 3]> {
-    let text = word.text();
-    let mut channels = text.split(|c: char| c == '/' || c.is_whitespace()).filter(|part| !part.is_empty());
-    let mut next = || channels.next().and_then(|part| part.parse::<u8>().ok());
-    match (next(), next(), next()) {
-        (Some(r), Some(g), Some(b)) => Ok([r, g, b]),
-        _ => Err(words.error(word.at, format!("expected a colour R/G/B, each 0 to 255, found {}", shown(word.bytes)))),
-    }
+    attributes::rgb(&word.text()).map_err(|what| words.error(word.at, what))
 }
 
 /// The keys and values after `put NAME comb`.

@@ -14,13 +14,15 @@ use super::{shapes, transform};
 use crate::error::Result;
 use crate::scene::description::ItemKind;
 use crate::scene::solids::{NodeId, NodeKind, Placed, Polyhedron, Solid, SolidNode, SolidTree};
-use crate::scene::solids::{ellipsoid, elliptic_hyperboloid, elliptic_paraboloid, hyperboloid, torus, truncated_cone};
+use crate::scene::solids::{
+    ellipsoid, elliptic_hyperboloid, elliptic_paraboloid, elliptic_torus, hyperboloid, torus, truncated_cone,
+};
 
 /// Statements that combine solids.
 pub const OPERATIONS: [&str; 5] = ["union", "intersection", "difference", "xor", "complement"];
 /// Solids that are not shapes of their own; each may also stand alone.
-pub const SOLIDS: [&str; 7] =
-    ["ellipsoid", "torus", "truncated-cone", "polyhedron", "paraboloid", "hyperboloid", "capsule"];
+pub const SOLIDS: [&str; 8] =
+    ["ellipsoid", "torus", "elliptic-torus", "truncated-cone", "polyhedron", "paraboloid", "hyperboloid", "capsule"];
 
 /// A tree on its way, with the definitions that were built into it.
 struct Building<'n> {
@@ -215,6 +217,7 @@ pub fn fields_of(name: &str) -> &'static [&'static str] {
     match name {
         "ellipsoid" => &["center", "radii", "material"],
         "torus" => &["center", "normal", "radius", "tube", "material"],
+        "elliptic-torus" => &["center", "normal", "radius", "a", "b", "angle", "material"],
         "truncated-cone" => &["base", "height", "a", "b", "c", "d", "material"],
         "polyhedron" => &["material"],
         "paraboloid" => &["base", "height", "a", "b", "material"],
@@ -249,6 +252,16 @@ fn canonical(scope: &Scope<'_>, fields: &Fields<'_, '_, '_>, planes: &[&Node<'_>
             }
             let normal = fields.direction("normal")?.unwrap_or(DVec3::Z);
             torus(vector("center", DVec3::ZERO)?, normal, radius, tube)
+        }
+        "elliptic-torus" => {
+            let (radius, a) = (fields.positive("radius", 1.0)?, fields.positive("a", 0.25)?);
+            let (b, angle) = (fields.positive("b", 0.5 * a)?, fields.number("angle")?.unwrap_or(0.0).to_radians());
+            let normal = fields.direction("normal")?.unwrap_or(DVec3::Z);
+            let (up, out) = angle.sin_cos();
+            if (a * out).hypot(b * up) > radius {
+                return Err(fields.error("the tube of an elliptic torus must not be wider than its ring"));
+            }
+            elliptic_torus(vector("center", DVec3::ZERO)?, normal, radius, [a * out, a * up], b)
         }
         "truncated-cone" => {
             let (a, b) = (vector("a", DVec3::X)?, vector("b", DVec3::Y)?);

@@ -15,9 +15,9 @@ impl Solid {
             Self::Shape(Shape::Disc) => (DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 0.0)),
             Self::Shape(Shape::Cylinder | Shape::Cone { .. }) => about_axis(1.0, 1.0),
             Self::Polyhedron(polyhedron) => polyhedron.bounds(),
-            Self::Torus { minor } => {
-                let reach = DVec3::new(1.0 + minor, 1.0 + minor, *minor);
-                (-reach, reach)
+            Self::Torus { minor: reach } | Self::EllipticTorus { reach, .. } => {
+                let corner = DVec3::new(1.0 + reach, 1.0 + reach, *reach);
+                (-corner, corner)
             }
             Self::Taper { x, y } => about_axis(x.max(1.0), y.max(1.0)),
             Self::Round { profile } => {

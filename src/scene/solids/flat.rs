@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 
-use super::{NodeId, NodeKind, Solid, SolidTree};
+use super::{NodeId, NodeKind, Solid, SolidTree, WIDEST_TUBE};
 use crate::scene::description::{MaterialId, Shape};
 use crate::scene::mesh::Mesh;
 
@@ -182,6 +182,11 @@ fn check(solid: &Solid) -> Result<(), String> {
         Solid::Torus { minor } if !(*minor > 0.0 && *minor <= 1.0) => {
             Err(format!("the tube of a torus must be above 0 and not wider than its ring, found {minor}"))
         }
+        Solid::EllipticTorus { reach, lean }
+            if !(*reach > 0.0 && *reach <= WIDEST_TUBE * (1.0 + 1e-9) && lean.abs() < 1.0) =>
+        {
+            Err("the tube of an elliptic torus must not be a line, nor reach far beyond the middle of its ring".into())
+        }
         Solid::Taper { x, y } if !(*x >= 0.0 && *y >= 0.0 && x.is_finite() && y.is_finite()) => {
             Err(format!("the top of a tapered solid must not be negative, found {x} and {y}"))
         }
@@ -311,6 +316,9 @@ mod tests {
             Solid::Shape(Shape::Cone { top: 1.5 }),
             Solid::Torus { minor: 0.0 },
             Solid::Torus { minor: f64::NAN },
+            Solid::EllipticTorus { reach: 1.5, lean: 0.0 },
+            Solid::EllipticTorus { reach: 0.5, lean: -1.0 },
+            Solid::EllipticTorus { reach: 0.5, lean: f64::NAN },
             Solid::Taper { x: -1.0, y: 1.0 },
             Solid::Round { profile: [1.0, -3.0, 1.0] },
             Solid::Trough { profile: [f64::NAN, 0.0, 0.0] },

@@ -20,10 +20,14 @@ use glam::DAffine3;
 use super::description::{MaterialId, Shape};
 use super::mesh::Mesh;
 pub use place::{
-    Placed, ball, cone, cylinder, ellipsoid, elliptic_hyperboloid, elliptic_paraboloid, half_space,
+    Placed, ball, cone, cylinder, ellipsoid, elliptic_hyperboloid, elliptic_paraboloid, elliptic_torus, half_space,
     hyperbolic_cylinder, hyperboloid, parabolic_cylinder, torus, truncated_cone,
 };
 pub use polyhedron::{Plane, Polyhedron};
+
+/// Largest reach of a [`Solid::EllipticTorus`]: what neither semi-axis by itself reaches beyond the ring's axis does not,
+/// leaning, reach farther than this.
+pub const WIDEST_TUBE: f64 = std::f64::consts::SQRT_2;
 
 /// Index into [`SolidTree::nodes`].
 pub type NodeId = u32;
@@ -84,6 +88,14 @@ pub enum Solid {
     Torus {
         /// Radius of the tube, above 0 and at most 1.
         minor: f64,
+    },
+    /// An ellipse swept round the z axis, its middle on the circle x^2 + y^2 = 1, z = 0: with u = sqrt(x^2 + y^2) - 1 it is
+    /// u^2 - 2 `lean` u z + z^2 <= (1 - `lean`^2) `reach`^2. What is swept over twice, about the axis, is outside.
+    EllipticTorus {
+        /// How far the ellipse reaches, along z as along u: above 0 and at most [`WIDEST_TUBE`].
+        reach: f64,
+        /// How it leans outwards with z, above -1 and below 1; 0 is a torus.
+        lean: f64,
     },
     /// A truncated cone from the unit circle at z = 0 to an ellipse at z = 1, both round the z axis; the ellipse's
     /// semi-axes change linearly with z. For x = y it is a [`Shape::Cone`].

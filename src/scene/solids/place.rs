@@ -73,6 +73,30 @@ pub fn torus(v: DVec3, axis: DVec3, major: f64, minor: f64) -> Result<Placed, St
     Placed::new(Solid::Torus { minor: minor / major }, x * major, y * major, n * major, v)
 }
 
+/// An elliptic torus (BRL-CAD's `eto`): centre, the axis of revolution, radius of the ring, the first semi-axis of the
+/// tube's ellipse as its parts away from the axis and along it, the length of the second semi-axis.
+///
+/// # Errors
+/// Lengths that are not above zero, an axis without direction.
+pub fn elliptic_torus(v: DVec3, axis: DVec3, major: f64, [out, up]: [f64; 2], second: f64) -> Result<Placed, String> {
+    let first = out.hypot(up);
+    if !(major > 0.0 && first > 0.0 && second > 0.0) {
+        return Err(format!("its radius and semi-axes must be above zero, found {major}, {first} and {second}"));
+    }
+    let n = axis.try_normalize().ok_or("its axis has no direction")?;
+    let (x, y) = n.any_orthonormal_pair();
+    let (cos, sin) = (out / first, up / first);
+    // How far the ellipse reaches from the axis of the tube and along the other one.
+    let (wide, high) = (out.hypot(second * sin), up.hypot(second * cos));
+    let lean = (first - second) * (first + second) * sin * cos / (wide * high);
+    let reach = wide / major;
+    let solid = match lean.abs() > ALIKE || reach > 1.0 {
+        true => Solid::EllipticTorus { reach, lean },
+        false => Solid::Torus { minor: reach },
+    };
+    Placed::new(solid, x * major, y * major, n * (high / reach), v)
+}
+
 /// A right circular cylinder between two points.
 ///
 /// # Errors
@@ -194,4 +218,41 @@ fn hyperbola(b: f64, c: f64) -> Result<[f64; 3], String> {
     let whole = b + 2.0 * c;
     // s (b s + 2 c) / (b + 2 c) with s = 1 - z.
     Ok([1.0, -2.0 * (b + c) / whole, b / whole])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of the surface by its definition satisfy the canonical solid's equation.
+    #[test]
+    fn elliptic_tori_are_where_their_numbers_say() {
+        let (v, n) = (DVec3::new(3.0, -1.0, 2.0), DVec3::new(1.0, 2.0, -0.5).normalize());
+        let (x, y) = n.any_orthonormal_pair();
+        for (out, up, second) in
+            [(1.5, 0.5, 0.75), (0.5, -1.5, 1.0), (-0.25, 1.0, 1.25), (2.0, 0.0, 0.5), (0.0, 1.0, 3.0)]
+        {
+            let placed = elliptic_torus(v, 7.0 * n, 4.0, [out, up], second).unwrap();
+            let (reach, lean) = match placed.solid {
+                Solid::EllipticTorus { reach, lean } => (reach, lean),
+                Solid::Torus { minor } => (minor, 0.0),
+                other => panic!("{other:?}"),
+            };
+            let first = f64::hypot(out, up);
+            let back = placed.transform.inverse();
+            for i in 0..400 {
+                let (about, within) = (0.1 * f64::from(i), 0.37 * f64::from(i));
+                let (a, b) = (within.cos(), second / first * within.sin());
+                let (along, height) = (4.0 + out * a - up * b, up * a + out * b);
+                let p = back.transform_point3(v + (x * about.cos() + y * about.sin()) * along + n * height);
+                let u = p.x.hypot(p.y) - 1.0;
+                let form = u * u - 2.0 * lean * u * p.z + p.z * p.z;
+                let whole = (1.0 - lean * lean) * reach * reach;
+                assert!((form / whole - 1.0).abs() < 1e-12, "{out} {up} {second}: {p}");
+            }
+        }
+        assert!(elliptic_torus(v, n, 4.0, [0.0, 0.0], 1.0).is_err());
+        assert!(elliptic_torus(v, n, 4.0, [1.0, 0.0], 0.0).is_err());
+        assert!(elliptic_torus(v, DVec3::ZERO, 4.0, [1.0, 0.0], 1.0).is_err());
+    }
 }

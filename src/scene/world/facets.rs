@@ -115,7 +115,7 @@ fn faces(solid: &Solid) -> u32 {
         Solid::Shape(Shape::Cylinder | Shape::Cone { .. }) | Solid::Round { .. } | Solid::Taper { .. } => 3,
         Solid::Trough { .. } => 5,
         Solid::Polyhedron(polyhedron) => polyhedron.planes().len() as u32,
-        Solid::Torus { .. } | Solid::Mesh(_) => 0,
+        Solid::Torus { .. } | Solid::EllipticTorus { .. } | Solid::Mesh(_) => 0,
     }
 }
 

@@ -47,6 +47,7 @@ fn form<'a>(solid: &'a Solid, planes: &'a [(DVec3, f64)]) -> Form<'a> {
         Solid::Shape(Shape::Sphere | Shape::Disc) => Form::Sphere,
         Solid::Polyhedron(_) => Form::Planes(planes),
         Solid::Torus { minor } => Form::Torus(minor),
+        Solid::EllipticTorus { reach, lean } => Form::EllipticTorus([reach, lean]),
         Solid::Taper { x, y } => Form::Taper([x, y]),
         Solid::Round { profile } => Form::Round(profile),
         Solid::Trough { profile } => Form::Trough(profile),
@@ -99,6 +100,7 @@ pub fn solid_normal(solid: &Solid, point: DVec3, face: u32) -> DVec3 {
             polyhedron.planes().get(face as usize).map_or(DVec3::ZERO, |plane| plane.normal)
         }
         Solid::Torus { .. } => shape::torus_normal(point),
+        Solid::EllipticTorus { reach, lean } => shape::elliptic_torus_normal(point, [*reach, *lean]),
         Solid::Taper { x, y } => shape::taper_normal(point, face, [*x, *y]),
         Solid::Round { profile } => shape::quadric::round_normal(point, face, *profile),
         Solid::Trough { profile } => shape::quadric::trough_normal(point, face, *profile),

@@ -36,7 +36,7 @@ pub fn of_shape(shape: &Shape, point: DVec3, normal: DVec3) -> [f64; 2] {
 pub fn of_solid(solid: &Solid, point: DVec3, normal: DVec3, face: u32) -> [f64; 2] {
     match solid {
         Solid::Shape(shape) => of_shape(shape, point, normal),
-        Solid::Torus { .. } => {
+        Solid::Torus { .. } | Solid::EllipticTorus { .. } => {
             let out = point.x.hypot(point.y) - 1.0;
             [turn(point.x, point.y), turn(out, point.z)]
         }
