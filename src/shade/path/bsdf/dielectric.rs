@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_PI;
 use super::facets::{FacetsList, PacketFacets};
 use super::ggx::Ggx;
 use super::matte::infinity;
-use super::warp::{grazing, grazing_pdf};
+use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, conductor::reflected, fresnel, mirrored, none, ratio};
 use crate::lanes::space::{choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
@@ -104,8 +104,7 @@ impl<V: Lanes> RoughDielectric<'_, V> {
         let up = self.facets.up[0] * self.facets.lost(wi[2]) * part;
         let through = self.facets.down * self.facets.lost_behind(wi[2]) * part;
         let chance = V::select(is_mirror, self.facets.chance, one - self.facets.chance);
-        let pdf = chance * lost * grazing_pdf(wi[2].abs(), self.facets.alpha);
-        Value { value: choose(is_mirror, [up; 3], self.passed(through)), pdf }
+        Value { value: choose(is_mirror, [up; 3], self.passed(through)), pdf: chance * part }
     }
 
     /// Both, when a direction is looked for by many facets with the chance `lost`.
@@ -141,7 +140,7 @@ impl<'t, V: Lanes> Bsdf<'t, V> for RoughDielectric<'t, V> {
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
         let lost = self.facets.lost(wo[2]);
         let is_multiple = choice.cmp_lt(lost);
-        let wide = grazing(place, self.facets.alpha);
+        let wide = cosine(place);
         let is_back = choice.cmp_lt(lost * self.facets.chance);
         let wide = [wide[0], wide[1], V::select(is_back, wide[2], -wide[2])];
         // What is left of the number is as good as a new one.
