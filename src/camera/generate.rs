@@ -61,22 +61,9 @@ pub fn fill_tile<S: Real>(
     sub_pixel: SubPixel,
     rays: &mut Rays<S>,
 ) {
-    make_tile(camera, tiling, tile, rect, sub_pixel, &mut Pencil::default(), rays);
-}
-
-/// Both [`aim_tile`], whose answer is returned, and [`fill_tile`].
-pub fn make_tile<S: Real>(
-    camera: &Camera,
-    tiling: &Tiling,
-    tile: u32,
-    rect: PixelRect,
-    sub_pixel: SubPixel,
-    pencil: &mut Pencil,
-    rays: &mut Rays<S>,
-) -> bool {
-    if aim_tile(camera, tiling, tile, rect, sub_pixel, pencil) {
-        pencil.fill(rays);
-        return true;
+    let mut pencil = Pencil::default();
+    if aim_tile(camera, tiling, tile, rect, sub_pixel, &mut pencil) {
+        return pencil.fill(rays);
     }
     let count = pencil.len();
     rays.prepare(count);
@@ -88,7 +75,6 @@ pub fn make_tile<S: Real>(
     rays.t_min[..count].fill(S::ZERO);
     rays.t_max[..count].fill(S::INFINITY);
     pencil.kill(rays);
-    false
 }
 
 /// Where the rays of [`fill_tile`] go. False for a parallel camera, whose rays have no point in common: places are then

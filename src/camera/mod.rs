@@ -12,7 +12,7 @@ mod tiles;
 
 pub use filter::Filter;
 pub use framing::framing;
-pub use generate::{SubPixel, aim_tile, fill_tile, make_tile};
+pub use generate::{SubPixel, aim_tile, fill_tile};
 pub use model::{Camera, CameraOverrides};
 pub use scattered::fill_pixels;
 pub use tiles::{FILE_TILE, PixelRect, Tiling, morton_decode, morton_encode};

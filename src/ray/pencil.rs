@@ -80,7 +80,7 @@ impl Places {
 
 /// What sixteen rays of a block have of the four lines that start with line `first`.
 #[inline(always)]
-pub fn spread<T: Copy + Default>(lines: &[T; EDGE], first: usize, axis: usize) -> [T; 16] {
+fn spread<T: Copy + Default>(lines: &[T; EDGE], first: usize, axis: usize) -> [T; 16] {
     let four: [T; 4] = lines[first..].first_chunk().copied().unwrap_or_default();
     // Not `map`: what it makes of long arrays is a call.
     let mut all = [T::default(); 16];

@@ -12,12 +12,12 @@ use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{Patch, channels, empty_film};
 use super::pixels::{add, add_light, alone, begin, mean, variance};
 use super::tally::Tally;
-use crate::camera::{Camera, PixelRect, Tiling, make_tile, morton_decode};
+use crate::camera::{Camera, PixelRect, Tiling, fill_tile, morton_decode};
 use crate::error::{Result, locked};
 use crate::film::Film;
 use crate::film::Window;
 use crate::lanes::Real;
-use crate::ray::{Counters, Pencil, Rays};
+use crate::ray::{Counters, Rays};
 use crate::scene::description::Description;
 use crate::scene::world::World;
 use crate::shade::{PathStats, RayCounts, Sample, Shader, Workspace, headlight};
@@ -177,7 +177,6 @@ impl Sums {
 /// One thread's arrays, reused from tile to tile.
 struct TileMemory<S> {
     rays: Rays<S>,
-    pencil: Pencil,
     work: Workspace<S>,
     /// Pixel of each ray, also of dead ones.
     pixels: Vec<(u32, u32)>,
@@ -190,7 +189,6 @@ impl<S: Real> Default for TileMemory<S> {
     fn default() -> Self {
         Self {
             rays: Rays::new(0),
-            pencil: Pencil::default(),
             work: Workspace::default(),
             pixels: Vec::new(),
             samples: Vec::new(),
@@ -220,9 +218,8 @@ impl<S: Real> Job<'_, S> {
             }
             let sample = sums.count;
             let sub_pixel = self.options.sub_pixel(sample);
-            let TileMemory { rays, pencil, work, pixels, samples, .. } = &mut *memory;
-            let is_pencil = make_tile(self.camera, &self.tiling, tile, self.rect, sub_pixel, pencil, rays);
-            self.shader.shade(rays, is_pencil.then_some(pencil), pixels, sample, work, samples);
+            fill_tile(self.camera, &self.tiling, tile, self.rect, sub_pixel, &mut memory.rays);
+            self.shader.shade(&memory.rays, &memory.pixels, sample, &mut memory.work, &mut memory.samples);
             if let Some(mattes) = &self.mattes {
                 mattes.count(&memory.samples, &mut sums.coverages);
             }

@@ -19,7 +19,7 @@ use super::whitted;
 use crate::camera::Camera;
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::Real;
-use crate::ray::{Counters, Hits, Pencil, Rays};
+use crate::ray::{Counters, Hits, Rays};
 use crate::scene::description::{Description, Light};
 use crate::scene::light::Environment;
 use crate::scene::world::World;
@@ -171,13 +171,12 @@ impl<'a, S: Real> Shader<'a, S> {
         self
     }
 
-    /// What each ray of the primary batch `rays` sees, into `out` (made as long as the batch). If they are those of `pencil`,
-    /// the engine may make them itself. Ray `i` belongs to pixel `pixels[i]` and is that pixel's sample number `sample`. Dead rays give [`Sample::MISS`]. Where no first hits
+    /// What each ray of the primary batch `rays` sees, into `out` (made as long as the batch). Ray `i` belongs to
+    /// pixel `pixels[i]` and is that pixel's sample number `sample`. Dead rays give [`Sample::MISS`]. Where no first hits
     /// are wanted, only radiance and coverage mean something.
     pub fn shade(
         &self,
         rays: &Rays<S>,
-        pencil: Option<&Pencil>,
         pixels: &[(u32, u32)],
         sample: u32,
         work: &mut Workspace<S>,
@@ -204,7 +203,7 @@ impl<'a, S: Real> Shader<'a, S> {
             self.trace_blocks(rays, work, out);
             work.clock.tracing += clock.elapsed();
         } else {
-            self.intersect(rays, pencil, work, |i, layer| self.number(pixels[i], sample, 0, layer));
+            self.intersect(rays, work, |i, layer| self.number(pixels[i], sample, 0, layer));
         }
         for i in (0..rays.len()).filter(|i| work.hits.is_hit(*i)) {
             out[i].alpha = 1.0;
@@ -229,17 +228,11 @@ impl<'a, S: Real> Shader<'a, S> {
 
     /// Closest hits of `rays` into `work.hits`. Where surfaces let rays pass by chance, `number` decides for ray `i` at
     /// its layer `k`.
-    pub(super) fn intersect(
-        &self,
-        rays: &Rays<S>,
-        pencil: Option<&Pencil>,
-        work: &mut Workspace<S>,
-        number: impl Fn(usize, u32) -> f64,
-    ) {
+    pub(super) fn intersect(&self, rays: &Rays<S>, work: &mut Workspace<S>, number: impl Fn(usize, u32) -> f64) {
         let clock = Instant::now();
         let counters = self.settings.count.then_some(&mut work.counters);
         let (hits, scratch, again) = (&mut work.hits, &mut work.scratch, &mut work.again);
-        self.through().closest(rays, pencil, hits, scratch, again, counters, number);
+        self.through().closest(rays, hits, scratch, again, counters, number);
         work.clock.tracing += clock.elapsed();
     }
 

@@ -8,7 +8,7 @@ use super::look::Looks;
 use crate::camera::sampling::pcg4d;
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::Real;
-use crate::ray::{Counters, Hits, INVALID_ID, Pencil, Rays};
+use crate::ray::{Counters, Hits, INVALID_ID, Rays};
 use crate::scene::world::World;
 use crate::trace::{Engine, Scratch};
 
@@ -49,23 +49,18 @@ impl<S: Real> Default for Again<S> {
 }
 
 impl<S: Real> Through<'_, S> {
-    /// Closest hits of `rays`, which may be those of `pencil`, into `hits`; what opacity lets pass is no hit. `number` gives the number in [0, 1) that
+    /// Closest hits of `rays` into `hits`; what opacity lets pass is no hit. `number` gives the number in [0, 1) that
     /// decides for ray `i` at its layer `k`.
     pub fn closest(
         &self,
         rays: &Rays<S>,
-        pencil: Option<&Pencil>,
         hits: &mut Hits<S>,
         scratch: &mut Scratch,
         again: &mut Again<S>,
         mut counters: Option<&mut Counters>,
         number: impl Fn(usize, u32) -> f64,
     ) {
-        let (world, engine) = (self.world, self.engine);
-        let of_pencil = |pencil| engine.intersect_pencil(world, pencil, hits, scratch, counters.as_deref_mut());
-        if !pencil.is_some_and(of_pencil) {
-            engine.intersect(world, rays, hits, scratch, counters.as_deref_mut());
-        }
+        self.engine.intersect(self.world, rays, hits, scratch, counters.as_deref_mut());
         if !self.looks.has_holes {
             return;
         }

@@ -78,7 +78,7 @@ impl<S: Real> Shader<'_, S> {
             if now.len() == 0 {
                 break;
             }
-            self.intersect(&now.rays, None, work, |i, layer| {
+            self.intersect(&now.rays, work, |i, layer| {
                 self.number(pixels[now.path[i] as usize], sample, level + 1, layer)
             });
             for i in (0..now.len()).filter(|i| !work.hits.is_hit(*i)) {

@@ -30,11 +30,11 @@ use super::patch::{Patch, channels, empty_film};
 use super::pixels::{begin, mean};
 use super::scheduler::RenderOutput;
 use super::tally::Tally;
-use crate::camera::{Camera, PixelRect, Tiling, fill_pixels, make_tile, morton_decode};
+use crate::camera::{Camera, PixelRect, Tiling, fill_pixels, fill_tile, morton_decode};
 use crate::error::{Error, Result, locked};
 use crate::film::Window;
 use crate::lanes::Real;
-use crate::ray::{Pencil, Rays};
+use crate::ray::Rays;
 use crate::scene::description::Description;
 use crate::scene::world::World;
 use crate::shade::{Sample, Shader, Workspace, headlight};
@@ -88,7 +88,6 @@ struct Tile {
 /// One thread's arrays.
 struct Memory<S> {
     rays: Rays<S>,
-    pencil: Pencil,
     work: Workspace<S>,
     pixels: Vec<(u32, u32)>,
     samples: Vec<Sample>,
@@ -97,8 +96,8 @@ struct Memory<S> {
 
 impl<S: Real> Default for Memory<S> {
     fn default() -> Self {
-        let (rays, pencil, work) = (Rays::new(0), Pencil::default(), Workspace::default());
-        Self { rays, pencil, work, pixels: Vec::new(), samples: Vec::new(), patch: Patch::default() }
+        let (rays, work) = (Rays::new(0), Workspace::default());
+        Self { rays, work, pixels: Vec::new(), samples: Vec::new(), patch: Patch::default() }
     }
 }
 
@@ -246,7 +245,7 @@ impl<'a, S: Real> Progressive<'a, S> {
             }
             let size = (self.options.width, self.options.height);
             fill_pixels(self.camera, size, &memory.pixels, self.options.sub_pixel(0), &mut memory.rays);
-            self.shader.shade(&memory.rays, None, &memory.pixels, 0, &mut memory.work, &mut memory.samples);
+            self.shader.shade(&memory.rays, &memory.pixels, 0, &mut memory.work, &mut memory.samples);
             if self.options.spp > 1 {
                 self.keep_first(&memory.pixels, &memory.samples);
             }
@@ -301,9 +300,9 @@ impl<'a, S: Real> Progressive<'a, S> {
                     return Tally::take(&mut memory.work, 0);
                 }
                 let sub_pixel = self.options.sub_pixel(tile.samples);
-                let Memory { rays, pencil, work, pixels, samples: seen, .. } = &mut *memory;
-                let is_pencil = make_tile(self.camera, &self.tiling, *number, self.rect, sub_pixel, pencil, rays);
-                self.shader.shade(rays, is_pencil.then_some(pencil), pixels, tile.samples, work, seen);
+                fill_tile(self.camera, &self.tiling, *number, self.rect, sub_pixel, &mut memory.rays);
+                let Memory { rays, work, pixels, samples: seen, .. } = memory;
+                self.shader.shade(rays, pixels, tile.samples, work, seen);
                 tile.sums.add_all(seen);
                 tile.samples += 1;
             }

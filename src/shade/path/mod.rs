@@ -156,8 +156,7 @@ impl<'a, S: Real> Paths<'a, S> {
         let clock = Instant::now();
         let through = Through { world: self.world, engine: self.engine, looks: &self.looks };
         let (pixels, paths) = (&memory.pixels, &memory.now.path);
-        let (hits, scratch, again) = (&mut work.hits, &mut work.scratch, &mut memory.again);
-        through.closest(&memory.now.rays, None, hits, scratch, again, None, |i, layer| {
+        through.closest(&memory.now.rays, &mut work.hits, &mut work.scratch, &mut memory.again, None, |i, layer| {
             number(pixels[paths[i] as usize], sample, bounce, layer)
         });
         let traced = clock.elapsed();
