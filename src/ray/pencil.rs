@@ -28,6 +28,7 @@ pub struct Pencil {
 
 /// Where rays cross the plane at distance one, to the right (`[0]`) and up (`[1]`).
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "there is one per thread, made anew for each tile: a box would be, too")]
 pub enum Places {
     /// The same for all rays of a column of pixels, and for all of a row.
     Grid([[f64; EDGE]; 2]),
