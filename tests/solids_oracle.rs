@@ -98,7 +98,7 @@ fn elliptic_tori<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, 
         };
         let first = torus(&mut tree);
         let kind = [NodeKind::Union, NodeKind::Difference, NodeKind::Xor];
-        if seed % 4 > 0 {
+        if !seed.is_multiple_of(4) {
             let second = torus(&mut tree);
             tree.op(kind[seed as usize % 4 - 1](vec![first, second]));
         }

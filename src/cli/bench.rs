@@ -151,10 +151,13 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     // Peers ask for it, and then our engines get it too.
     let workers = Workers::new(args.threads.count())?.flushing(!args.peers.is_empty());
     let run = Run::now(workers.threads());
-    let ports = calibrated(&workers, &args.output);
+    let ports = workers.install(Ports::measure);
     let facts = env::facts(workers.threads(), &ports);
     let mut rows = Vec::new();
     let finished = measure(args, &workers, &mut rows);
+    if !rows.is_empty() {
+        say_ports(&ports, &args.output);
+    }
     if args.output.json {
         json_to_stdout(&Report { run: &run, ports: &ports, rows: &rows })?;
     } else if !rows.is_empty() {
@@ -182,11 +185,9 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     Ok(())
 }
 
-/// What a core does in a cycle, measured and said.
-fn calibrated(workers: &Workers, output: &OutputArgs) -> Ports {
-    let ports = workers.install(Ports::measure);
+/// Says what a core does in a cycle.
+fn say_ports(ports: &Ports, output: &OutputArgs) {
     output.say(&format!("ports: {}", ports.words()));
-    ports
 }
 
 /// All scenes; finished rows are in `rows` also when a later scene fails.

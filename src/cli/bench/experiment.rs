@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::{calibrated, write, write_whole};
+use super::{say_ports, write, write_whole};
 use crate::bvh::LEAF_PRIMS;
 use crate::camera::framing;
 use crate::cli::interrupt::stopped;
@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::measure::bench::{self, Plan};
 use crate::measure::env;
 use crate::measure::experiment::{Case, Experiment, parse};
+use crate::measure::explain::Ports;
 use crate::measure::peers::Invitation;
 use crate::measure::raysets::RayKind;
 use crate::measure::rows::{Outcome, Row, Run};
@@ -32,7 +33,8 @@ pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &O
     let folder = folder.map_or_else(|| PathBuf::from(format!("experiment-{}", experiment.name)), Path::to_path_buf);
     claim(&folder, &text)?;
     output.say(&format!("{}: {}", experiment.name, experiment.question));
-    let ports = calibrated(&Workers::new(1)?, output);
+    let ports = Workers::new(1)?.install(Ports::measure);
+    say_ports(&ports, output);
     let steps = experiment.cases.len() * experiment.rays.len();
     let done = |case: &Case, class: &RayKind| place(&folder, case, *class).join("bench.csv").exists();
     let finished =
