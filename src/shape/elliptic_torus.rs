@@ -10,7 +10,8 @@ use glam::DVec3;
 
 use super::quartic;
 use super::span::{Span, nearest_to_origin};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot};
+use super::torus::Part;
+use crate::lanes::{Lanes, Lanes3, dot};
 
 /// How much wider than the solid the interval is in which roots are looked for: its ends are outside.
 const ROOM: f64 = 1.0 / 256.0;
@@ -26,20 +27,9 @@ pub fn elliptic_torus<V: Lanes>(
     let (o, shift) = nearest_to_origin(o, d);
     let (w, k, one) = (V::splat(reach), V::splat(lean), V::constant(1.0));
     let wide = V::constant(1.0 + ROOM);
-    // The line's way through a ball, cut by a slab.
     let (across, flat) = ((one + w) * wide, w * wide);
     let room = across.mul_add(across, flat.mul_add(flat, -dot(o, o)));
-    let chord = (room / dot(d, d)).sqrt();
-    let slab = Span::slab(o[2], d[2], [-flat, flat], [0.0, 0.0]);
-    let (from, to) = (slab.t_in.fast_max(-chord), slab.t_out.fast_min(chord));
-    let met = slab.hit & V::constant(0.0).cmp_lt(room) & from.cmp_lt(to);
-    if !met.any() {
-        return;
-    }
-    let half = V::constant(0.5);
-    let (middle, stretch) = (half * (from + to), half * (to - from));
-    let o = [0, 1, 2].map(|a| d[a].mul_add(middle, o[a]));
-    let d = d.map(|x| x * stretch);
+    let Some(Part { o, d, middle, reach: stretch, met }) = Part::of(o, d, room, flat) else { return };
     let round = |a: Lanes3<V>, b: Lanes3<V>| a[0].mul_add(b[0], a[1] * b[1]);
     let (two, four) = (V::constant(2.0), V::constant(4.0));
     // g0 + 2 g1 s + g2 s^2, the square of the distance to the axis r0 + 2 r1 s + r2 s^2, and the line l0 + l1 s.
@@ -78,7 +68,7 @@ pub fn elliptic_torus_normal(point: DVec3, [reach, lean]: [f64; 2]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::{Real, f32x8, f64x4};
+    use crate::lanes::{LaneMask, Real, f32x8, f64x4};
 
     /// Numbers below 1 in magnitude, different in every call.
     struct Random(u64);

@@ -16,21 +16,9 @@ pub fn torus<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, minor: V::Scalar, mut emit: i
     let (o, shift) = nearest_to_origin(o, d);
     let minor = V::splat(minor);
     let wide = V::constant(1.0 + ROOM);
-    // The line's way through a ball, cut by a slab.
     let ball = (V::constant(1.0) + minor) * wide;
     let room = ball.mul_add(ball, -dot(o, o));
-    let chord = (room / dot(d, d)).sqrt();
-    let flat = minor * wide;
-    let slab = Span::slab(o[2], d[2], [-flat, flat], [0.0, 0.0]);
-    let (from, to) = (slab.t_in.fast_max(-chord), slab.t_out.fast_min(chord));
-    let met = slab.hit & V::constant(0.0).cmp_lt(room) & from.cmp_lt(to);
-    if !met.any() {
-        return;
-    }
-    let half = V::constant(0.5);
-    let (middle, reach) = (half * (from + to), half * (to - from));
-    let o = [0, 1, 2].map(|a| d[a].mul_add(middle, o[a]));
-    let d = d.map(|x| x * reach);
+    let Some(Part { o, d, middle, reach, met }) = Part::of(o, d, room, minor * wide) else { return };
     // p = (|x|^2 + 1 - minor^2)^2 - 4 (x^2 + y^2), with the square of g0 + 2 g1 s + g2 s^2.
     let (g0, g1, g2) = (dot(o, o) + (V::constant(1.0) - minor * minor), dot(o, d), dot(d, d));
     let round = |a: Lanes3<V>, b: Lanes3<V>| a[0].mul_add(b[0], a[1] * b[1]);
@@ -46,6 +34,36 @@ pub fn torus<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, minor: V::Scalar, mut emit: i
         let at = |s: V| reach.mul_add(s, middle) + shift;
         emit(Span::plain(lanes & met, at(s_in), at(s_out)));
     });
+}
+
+/// A line's way through a ball, cut by a slab, as `o + s d` for s from -1 to 1; the line's own parameter is
+/// `middle + reach s`.
+pub(super) struct Part<V: Lanes> {
+    pub o: Lanes3<V>,
+    pub d: Lanes3<V>,
+    pub middle: V,
+    pub reach: V,
+    /// Lanes that have one.
+    pub met: V::Mask,
+}
+
+impl<V: Lanes> Part<V> {
+    /// Of the line `o + t d`, whose `o` is nearest to the centre. `room` is the square of the ball's radius less that of
+    /// `o`'s distance, the slab is |z| <= `flat`. `None` if no lane has any.
+    #[inline(always)]
+    pub fn of(o: Lanes3<V>, d: Lanes3<V>, room: V, flat: V) -> Option<Self> {
+        let chord = (room / dot(d, d)).sqrt();
+        let slab = Span::slab(o[2], d[2], [-flat, flat], [0.0, 0.0]);
+        let (from, to) = (slab.t_in.fast_max(-chord), slab.t_out.fast_min(chord));
+        let met = slab.hit & V::constant(0.0).cmp_lt(room) & from.cmp_lt(to);
+        if !met.any() {
+            return None;
+        }
+        let half = V::constant(0.5);
+        let (middle, reach) = (half * (from + to), half * (to - from));
+        let o = [0, 1, 2].map(|a| d[a].mul_add(middle, o[a]));
+        Some(Self { o, d: d.map(|x| x * reach), middle, reach, met })
+    }
 }
 
 /// Outward normal (not unit) at a surface point.
