@@ -52,7 +52,7 @@ fn tally<S: Engines>(name: &str) -> Tally {
         engine::<S>("auto").unwrap().intersect(&world, &rays, &mut hits, &mut Scratch::default(), None);
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
             let all = world.met(&rays, &hits, first);
-            let kept = world.met_facets(&rays, &hits, first);
+            let kept = world.met_facets(&rays, &hits, first, u32::MAX);
             for lane in 0..S::Wide::N {
                 let i = first + lane;
                 assert_eq!(all.hit >> lane & 1 != 0, hits.is_hit(i), "{name}");

@@ -6,7 +6,7 @@
 use super::filter::Filter;
 use super::model::Camera;
 use super::sampling::PixelRandom;
-use super::sobol::PixelPoints;
+use super::sobol::{PixelPoints, fraction};
 use super::tiles::{FILE_TILE, PixelRect, Tiling, morton_decode};
 use crate::lanes::Real;
 use crate::ray::Rays;
@@ -14,6 +14,9 @@ use crate::ray::pencil::{Pencil, Places};
 
 /// Name of the sub-pixel offsets among the random dimensions of a pixel.
 const DIMENSION: u32 = 0;
+
+/// Pixels that are looked at together.
+const BLOCK: usize = 16;
 
 /// Where in its pixel a ray goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,13 +44,29 @@ pub enum SubPixel {
 impl SubPixel {
     #[inline]
     pub(super) fn offset(self, anchor: [f64; 2], x: u32, y: u32) -> [f64; 2] {
+        self.offsets(anchor, &[[x], [y]]).map(|[offset]| offset)
+    }
+
+    /// Those of pixels given as columns and rows, as such.
+    #[inline]
+    fn offsets<const N: usize>(self, anchor: [f64; 2], [x, y]: &[[u32; N]; 2]) -> [[f64; N]; 2] {
+        let mut offsets = anchor.map(|a| [a; N]);
         match self {
-            Self::Anchor => anchor,
-            Self::Sample { sample, seed } => PixelRandom::new(x, y, seed).spread(sample, DIMENSION),
+            Self::Anchor => {}
+            Self::Sample { sample, seed } => {
+                for k in 0..N {
+                    [offsets[0][k], offsets[1][k]] = PixelRandom::new(x[k], y[k], seed).spread(sample, DIMENSION);
+                }
+            }
             Self::Filtered { sample, seed, filter } => {
-                PixelPoints::new(x, y, seed).point(sample, DIMENSION).map(|u| 0.5 + filter.place(u))
+                let mut bits = [[0; N]; 2];
+                for k in 0..N {
+                    [bits[0][k], bits[1][k]] = PixelPoints::new(x[k], y[k], seed).bits(sample, DIMENSION);
+                }
+                offsets = bits.map(|bits| bits.map(|bits| 0.5 + filter.place(fraction(bits))));
             }
         }
+        offsets
     }
 }
 
@@ -114,10 +133,17 @@ pub fn aim_tile(
             Places::Grid(_) => Default::default(),
         };
         lists.iter_mut().for_each(|list| list.resize(count, 0.0));
-        for i in 0..count {
-            let (dx, dy) = morton_decode(i as u32);
-            let [sx, sy] = sub_pixel.offset(camera.anchor, x0 + dx, y0 + dy);
-            (lists[0][i], lists[1][i]) = (across(x0 + dx, sx), up(y0 + dy, sy));
+        for first in (0..count).step_by(BLOCK) {
+            let mut pixels = [[0; BLOCK]; 2];
+            for k in 0..BLOCK {
+                let (dx, dy) = morton_decode((first + k) as u32);
+                (pixels[0][k], pixels[1][k]) = (x0 + dx, y0 + dy);
+            }
+            let offsets = sub_pixel.offsets(camera.anchor, &pixels);
+            let [a, b] = &mut lists;
+            for (k, (a, b)) in a[first..].iter_mut().zip(&mut b[first..]).enumerate().take(BLOCK) {
+                (*a, *b) = (across(pixels[0][k], offsets[0][k]), up(pixels[1][k], offsets[1][k]));
+            }
         }
         pencil.places = Places::Each(lists);
     }

@@ -89,6 +89,16 @@ pub trait Lanes:
     /// `self == other`, false for NaN.
     fn cmp_eq(self, other: Self) -> Self::Mask;
 
+    /// The lanes whose bits are set, moved to the front in order; zeros behind them.
+    #[inline(always)]
+    fn packed(self, bits: u32) -> Self {
+        let (mut from, mut to) = ([Self::Scalar::ZERO; MAX_LANES], [Self::Scalar::ZERO; MAX_LANES]);
+        self.store(&mut from);
+        let lanes = chosen::lanes_of(bits & Self::ALL);
+        to.iter_mut().zip(lanes).for_each(|(to, lane)| *to = from[lane % MAX_LANES]);
+        Self::load(&to)
+    }
+
     /// Smallest and largest value of the lanes in `mask` (not empty, no NaN).
     #[inline(always)]
     fn range(self, mask: u32) -> (Self::Scalar, Self::Scalar) {

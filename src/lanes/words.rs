@@ -206,6 +206,35 @@ fn transpose_bits_portable<const K: usize>(planes: [u32; K]) -> [u8; 16] {
     std::array::from_fn(|i| planes.iter().enumerate().fold(0, |all, (k, plane)| all | ((plane >> i & 1) << k) as u8))
 }
 
+/// See [`super::Lanes::packed`].
+#[inline(always)]
+pub fn packed(v: f32x16, bits: u32) -> f32x16 {
+    #[cfg(target_feature = "avx512f")]
+    {
+        use std::arch::x86_64::{_mm512_loadu_ps, _mm512_maskz_compress_ps, _mm512_storeu_ps};
+        let mut front = [0.0; 16];
+        // SAFETY: compiled only where the whole build has AVX-512F; the load reads the 64 bytes of `v`, the store fills
+        // those of `front`.
+        unsafe {
+            let lanes = _mm512_loadu_ps((&raw const v).cast::<f32>());
+            _mm512_storeu_ps(front.as_mut_ptr(), _mm512_maskz_compress_ps(bits as u16, lanes));
+        }
+        f32x16::new(front)
+    }
+    #[cfg(not(target_feature = "avx512f"))]
+    packed_portable(v, bits)
+}
+
+#[cfg(any(test, not(target_feature = "avx512f")))]
+fn packed_portable(v: f32x16, bits: u32) -> f32x16 {
+    let (from, mut to, mut count) = (v.to_array(), [0.0; 16], 0);
+    for (lane, x) in from.into_iter().enumerate() {
+        to[count % 16] = if bits >> lane & 1 != 0 { x } else { to[count % 16] };
+        count += (bits >> lane & 1) as usize;
+    }
+    f32x16::new(to)
+}
+
 /// Eight words of 64 bits.
 #[derive(Clone, Copy, Debug)]
 pub struct Marks(u64x8);
@@ -303,6 +332,17 @@ mod tests {
         move || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 32) as u32
+        }
+    }
+
+    #[test]
+    fn lanes_are_packed_in_order() {
+        let v = f32x16::new(std::array::from_fn(|i| i as f32 - 3.5));
+        for bits in [0u32, 1, 0x8000, 0b1010_0110_0001, 0xffff, 0x7ffe] {
+            let want: Vec<f32> = (0..16).filter(|i| bits >> i & 1 != 0).map(|i| i as f32 - 3.5).collect();
+            let got = packed(v, bits).to_array();
+            assert_eq!(got, packed_portable(v, bits).to_array());
+            assert!(got[..want.len()] == want[..] && got[want.len()..].iter().all(|&x| x == 0.0), "{bits:x}");
         }
     }
 

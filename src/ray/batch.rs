@@ -128,20 +128,23 @@ impl<S: Real> Rays<S> {
         finite && self.dir(i).iter().any(|&d| d != zero) && self.t_min[i] <= self.t_max[i]
     }
 
+    /// The live ones of rays `first..first + N`, lane by lane.
+    #[inline]
+    pub fn live_lanes(&self, first: usize) -> u32 {
+        let load = |from: &[S]| S::Wide::load(&from[first..]);
+        let zero = S::Wide::constant(0.0);
+        let nothing = |v: &[Vec<S>; 3]| load(&v[0]) * zero + load(&v[1]) * zero + load(&v[2]) * zero;
+        let finite = (nothing(&self.org) + nothing(&self.dir)).cmp_eq(zero);
+        let [x, y, z] = [0, 1, 2].map(|axis| load(&self.dir[axis]).cmp_eq(zero));
+        let live = finite & !(x & y & z) & load(&self.t_min).cmp_le(load(&self.t_max));
+        live.bits() & S::Wide::ALL
+    }
+
     /// Number of live rays.
     pub fn live_count(&self) -> usize {
-        let mut count = 0;
         // The padding is dead.
-        for first in (0..self.padded_len()).step_by(S::Wide::N) {
-            let load = |from: &[S]| S::Wide::load(&from[first..]);
-            let zero = S::Wide::constant(0.0);
-            let nothing = |v: &[Vec<S>; 3]| load(&v[0]) * zero + load(&v[1]) * zero + load(&v[2]) * zero;
-            let finite = (nothing(&self.org) + nothing(&self.dir)).cmp_eq(zero);
-            let [x, y, z] = [0, 1, 2].map(|axis| load(&self.dir[axis]).cmp_eq(zero));
-            let live = finite & !(x & y & z) & load(&self.t_min).cmp_le(load(&self.t_max));
-            count += (live.bits() & S::Wide::ALL).count_ones();
-        }
-        count as usize
+        let starts = (0..self.padded_len()).step_by(S::Wide::N);
+        starts.map(|first| self.live_lanes(first).count_ones() as usize).sum()
     }
 }
 

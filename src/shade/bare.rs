@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 
 use super::look::Looks;
-use crate::lanes::Real;
+use crate::lanes::chosen::{lanes_of, records};
+use crate::lanes::{MAX_LANES, Real};
+use crate::ray::Hits;
 use crate::scene::world::World;
 
 /// Most triangles that are kept.
@@ -13,11 +15,11 @@ const OTHER: u32 = u32::MAX;
 
 /// First corner and the edges from it to the second and the third, world space, and the material.
 #[derive(Clone, Copy, Debug)]
-pub struct Bare<S> {
+struct Bare<S> {
     /// Corner, edge, edge.
-    pub numbers: [S; 9],
+    numbers: [S; 9],
     /// Index into the description's materials.
-    pub material: u32,
+    material: u32,
 }
 
 /// Bare triangles by primitive number, where the world is one object of moderate size and there are
@@ -38,16 +40,47 @@ impl<S: Real> BareTriangles<S> {
         Self { kept: (0..count).into_par_iter().map(|prim| of(world, looks, prim, 0).unwrap_or(other)).collect() }
     }
 
-    /// Triangle `prim` of instance `inst`, if it is such a one.
-    #[inline]
-    pub fn get(&self, world: &World<S>, looks: &Looks<'_>, prim: u32, inst: u32) -> Option<Bare<S>> {
+    /// Corner and edges of the triangles that the `lanes` of rays `first..first + N` hit, where they are such: these lanes,
+    /// and their materials into `material`.
+    #[inline(always)]
+    pub fn gather(
+        &self,
+        (world, looks): (&World<S>, &Looks<'_>),
+        hits: &Hits<S>,
+        first: usize,
+        lanes: u32,
+        material: &mut [u32; MAX_LANES],
+    ) -> (u32, [S::Wide; 9]) {
+        let mut bare = 0;
         if self.kept.is_empty() {
-            return of(world, looks, prim, inst);
+            let mut own = [[S::ZERO; 9]; MAX_LANES];
+            for lane in lanes_of(lanes) {
+                let Some(found) = of(world, looks, hits.prim[first + lane], hits.inst[first + lane]) else { continue };
+                (own[lane], material[lane]) = (found.numbers, found.material);
+                bare |= 1 << lane;
+            }
+            return (bare, records(bare, &NUMBERS, |lane| &own[lane as usize % MAX_LANES]));
         }
-        let bare = &self.kept[prim as usize];
-        (bare.material != OTHER).then_some(*bare)
+        let mut prim = [0; MAX_LANES];
+        for lane in lanes_of(lanes) {
+            prim[lane] = hits.prim[first + lane];
+            let own = self.kept[prim[lane] as usize].material;
+            material[lane] = own;
+            bare |= u32::from(own != OTHER) << lane;
+        }
+        (bare, records(bare, &prim, |prim| &self.kept[prim as usize].numbers))
     }
 }
+
+/// The numbers of lanes.
+const NUMBERS: [u32; MAX_LANES] = {
+    let (mut numbers, mut lane) = ([0; MAX_LANES], 0);
+    while lane < MAX_LANES {
+        numbers[lane] = lane as u32;
+        lane += 1;
+    }
+    numbers
+};
 
 #[inline]
 fn of<S: Real>(world: &World<S>, looks: &Looks<'_>, prim: u32, inst: u32) -> Option<Bare<S>> {

@@ -79,8 +79,6 @@ struct Ready {
     is_textured: bool,
     /// Whether all points of it look the same, and shine not.
     is_even: bool,
-    /// Whether they also look the same from both sides.
-    is_uniform: bool,
 }
 
 /// The materials of a scene made ready.
@@ -137,13 +135,6 @@ impl<'a> Looks<'a> {
         id
     }
 
-    /// What every point of material `id` scatters with, if it [is alike](Self::is_alike), with four parameters at most.
-    #[inline]
-    pub fn uniform(&self, id: u32) -> Option<&Look> {
-        let ready = &self.entry(id).1;
-        ready.is_uniform.then_some(&ready.front)
-    }
-
     /// Whether all points of material `id` look the same, from both sides, none shines, and no normal map bends the surface.
     pub fn is_alike(&self, id: u32) -> bool {
         let (material, ready) = self.entry(id);
@@ -156,6 +147,19 @@ impl<'a> Looks<'a> {
     pub fn even(&self, id: u32, from_front: bool) -> Option<&Look> {
         let ready = &self.entry(id).1;
         ready.is_even.then_some(if from_front { &ready.front } else { &ready.back })
+    }
+
+    /// What points without textures scatter with, material by material from the front and from behind.
+    pub fn sides(&self) -> impl Iterator<Item = &Look> {
+        self.materials.iter().flat_map(|(_, ready)| [&ready.front, &ready.back])
+    }
+
+    /// [`Self::even`] as its place in [`Self::sides`], with the model.
+    #[inline]
+    pub fn even_side(&self, id: u32, from_front: bool) -> Option<(u32, Model)> {
+        let look = self.even(id, from_front)?;
+        let id = if (id as usize) < self.materials.len() { id } else { 0 };
+        Some((2 * id + u32::from(!from_front), look.model))
     }
 
     /// What material `id` (no mixture) scatters with at `surface`; `from_front`: seen from the side of its normal.
@@ -298,13 +302,8 @@ impl Ready {
             && t.occlusion.is_none()
             && material.emission == DVec3::ZERO
             && !matches!(material.scattering, Scattering::Mix { .. });
-        let is_uniform = is_even
-            && matches!(
-                material.scattering,
-                Scattering::Matte | Scattering::Plastic { .. } | Scattering::MetallicRoughness { .. }
-            );
         let (front, back) = (constant(material, true, rough), constant(material, false, rough));
-        Self { front, back, is_textured, is_even, is_uniform }
+        Self { front, back, is_textured, is_even }
     }
 }
 

@@ -56,6 +56,16 @@ impl Sample {
         prim: INVALID_ID,
         nodes: 0.0,
     };
+
+    /// Adds light that a path met after `bounce` scatterings, if it is a number.
+    pub(super) fn shine(&mut self, bounce: u32, light: DVec3) {
+        if light != DVec3::ZERO && light.is_finite() {
+            self.radiance += light;
+            if bounce <= 1 {
+                self.direct += light;
+            }
+        }
+    }
 }
 
 /// Live rays traced, by kind.

@@ -5,10 +5,10 @@ use std::time::Instant;
 
 use glam::DVec3;
 
-use super::bare::BareTriangles;
 use super::classic::Classic;
 use super::integrator::Integrator;
 use super::look::Looks;
+use super::meeting::Meeting;
 use super::path::{PathMemory, Paths};
 use super::rt::Rt;
 use super::sample::{RayCounts, Sample};
@@ -118,9 +118,7 @@ pub struct Shader<'a, S: Real> {
     /// Length of occlusion rays, scene units.
     pub(super) ao_length: f64,
     pub(super) looks: Arc<Looks<'a>>,
-    /// Whether some hits come out of the world in lanes.
-    pub(super) has_facets: bool,
-    pub(super) bare: BareTriangles<S>,
+    pub(super) meeting: Meeting<S>,
     rt: Option<Rt>,
     paths: Option<Paths<'a, S>>,
 }
@@ -140,10 +138,10 @@ impl<'a, S: Real> Shader<'a, S> {
         let looks = Arc::new(Looks::new(description));
         let paths = (settings.integrator == Integrator::Path)
             .then(|| Paths::new(world, description, looks.clone(), engine, &settings));
-        let bare = if settings.integrator.works_on_vertices() {
-            BareTriangles::new(world, &looks, settings.rays)
+        let meeting = if settings.integrator.works_on_vertices() {
+            Meeting::new(world, &looks, settings.rays)
         } else {
-            BareTriangles::default()
+            Meeting::none()
         };
         let lights = if description.lights.is_empty() { vec![default_light] } else { description.lights.clone() };
         Self {
@@ -157,8 +155,7 @@ impl<'a, S: Real> Shader<'a, S> {
             ambient: description.ambient,
             settings,
             ao_length: if ao_length.is_nan() { f64::INFINITY } else { ao_length },
-            has_facets: world.has_facets(),
-            bare,
+            meeting,
             rt: None,
             paths,
         }

@@ -5,12 +5,12 @@ use glam::DVec3;
 
 use super::classic::{Classic, Terms};
 use super::look::{Look, Model};
+use super::meeting::{Met, met_lanes};
 use super::offset::position_error;
-use super::place::Place;
 use super::shader::Shader;
 use crate::lanes::chosen::{self, lanes_of};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3};
-use crate::ray::{Hits, INVALID_ID, Rays};
+use crate::ray::{Hits, Rays};
 use crate::scene::world::Surface;
 
 /// First field of the position, world space.
@@ -115,28 +115,19 @@ impl<S: Real> Vertices<S> {
     }
 }
 
-/// Where a vector of rays met surfaces, and whose.
-struct Met<V> {
-    place: Place<V>,
-    material: [u32; MAX_LANES],
-    /// Lanes whose numbers are here.
-    known: u32,
-}
-
 impl<S: Real> Shader<'_, S> {
     /// The points that `rays` met in `hits`, into `vertices`.
     pub(super) fn meet(&self, rays: &Rays<S>, hits: &Hits<S>, vertices: &mut Vertices<S>) {
         vertices.open(rays.padded_len());
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
-            let prims = &hits.prim[first..][..S::Wide::N];
-            let hit =
-                prims.iter().enumerate().fold(0, |hit, (lane, &prim)| hit | u32::from(prim != INVALID_ID) << lane);
+            let hit = met_lanes(hits, first);
             vertices.lanes.push(hit);
             vertices.shining.push(0);
             if hit == 0 {
                 continue;
             }
-            let Met { place, mut material, known } = self.places(rays, hits, first, hit);
+            let Met { place, mut material, known } =
+                self.meeting.places(self.world, &self.looks, rays, hits, first, hit);
             vertices.put_lanes(POSITION, first, place.position);
             vertices.put_lanes(NORMAL, first, place.normal);
             vertices.put_lanes(SHADING, first, place.normal);
@@ -161,44 +152,6 @@ impl<S: Real> Shader<'_, S> {
             }
             self.look_at(rays, first, hit & !settled, &material, front, vertices);
         }
-    }
-
-    /// Places on shapes and on triangles without shading normals.
-    #[inline(always)]
-    fn places(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize, hit: u32) -> Met<S::Wide> {
-        let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
-        let (dir, t) = (vector(&rays.dir), S::Wide::load(&hits.t[first..]));
-        let zero = S::Wide::constant(0.0);
-        let nowhere = Place { position: [zero; 3], normal: [zero; 3], offset: zero, front: 0 };
-        let mut met = Met { place: nowhere, material: [INVALID_ID; MAX_LANES], known: 0 };
-        if self.has_facets {
-            let facets = self.world.met_facets(rays, hits, first);
-            met.known = facets.hit;
-            if facets.hit != 0 {
-                met.place = Place::on_facet(&facets, vector(&rays.org), dir, t);
-                met.material = facets.material;
-            }
-        }
-        let mut columns = [[S::ZERO; MAX_LANES]; 9];
-        let mut bare = 0;
-        for lane in lanes_of(hit & !met.known) {
-            let i = first + lane;
-            let Some(triangle) = self.bare.get(self.world, &self.looks, hits.prim[i], hits.inst[i]) else { continue };
-            columns.iter_mut().zip(triangle.numbers).for_each(|(column, x)| column[lane] = x);
-            met.material[lane] = triangle.material;
-            bare |= 1 << lane;
-        }
-        if bare != 0 {
-            let edge = |k: usize| each(|axis| S::Wide::load(&columns[3 * k + axis]));
-            let [u, v] = [&hits.u, &hits.v].map(|from| S::Wide::load(&from[first..]));
-            let place = Place::on_triangle([edge(0), edge(1), edge(2)], [u, v, t], dir);
-            // Triangles without area are looked at one by one.
-            let square = dot(place.normal, place.normal);
-            let bare = bare & square.cmp_lt(S::Wide::constant(1.5)).bits();
-            met.place = place.or(bare, met.place);
-            met.known |= bare;
-        }
-        met
     }
 
     /// The place of ray `i`'s hit, in f64.

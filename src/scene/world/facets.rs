@@ -146,14 +146,14 @@ impl<S: Real> World<S> {
     /// gives them up to rounding in `S`, but for degenerate ones, whose normals are not unit.
     #[inline]
     pub fn met(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize) -> Met<S::Wide> {
-        self.look_up::<true>(rays, hits, first)
+        self.look_up::<true>(rays, hits, first, u32::MAX)
     }
 
-    /// The same of those hits on shapes and solids of instances that stay where their objects are whose normals are
-    /// affine functions of the point, and not degenerate.
+    /// The same of those hits of `lanes` on shapes and solids of instances that stay where their objects are whose normals
+    /// are affine functions of the point, and not degenerate.
     #[inline]
-    pub fn met_facets(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize) -> Met<S::Wide> {
-        let mut met = self.look_up::<false>(rays, hits, first);
+    pub fn met_facets(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize, lanes: u32) -> Met<S::Wide> {
+        let mut met = self.look_up::<false>(rays, hits, first, lanes);
         let square = dot(met.normal, met.normal);
         met.hit &= square.cmp_lt(S::Wide::constant(1.5)).bits();
         met
@@ -161,7 +161,7 @@ impl<S: Real> World<S> {
 
     /// `ALL`: of all hits, else those with facets.
     #[inline(always)]
-    fn look_up<const ALL: bool>(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize) -> Met<S::Wide> {
+    fn look_up<const ALL: bool>(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize, lanes: u32) -> Met<S::Wide> {
         let n = S::Wide::N;
         let zero = [S::Wide::constant(0.0); 3];
         let none = [INVALID_ID; MAX_LANES];
@@ -169,6 +169,7 @@ impl<S: Real> World<S> {
         for lane in 0..n {
             met.hit |= u32::from(hits.prim[first + lane] != INVALID_ID) << lane;
         }
+        met.hit &= lanes;
         if met.hit == 0 {
             return met;
         }
@@ -230,7 +231,9 @@ impl<S: Real> World<S> {
                     continue;
                 }
             };
-            columns.iter_mut().zip(&facet.fields).for_each(|(column, &x)| column[lane] = x);
+            for (column, &x) in columns.iter_mut().zip(&facet.fields) {
+                column[lane] = x;
+            }
         }
         vectors(|k| S::Wide::load(&columns[k]))
     }

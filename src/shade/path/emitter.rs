@@ -78,22 +78,21 @@ pub struct Aim {
     pub is_point: bool,
 }
 
-/// An emitting triangle of even radiance: corner, edges, normal, area and radiances to the front and to the back, in
-/// one list for packets to copy.
-#[derive(Clone, Copy, Debug)]
-pub struct Flat {
-    /// Corner, edge, edge, normal, radiance to the front, radiance to the back: three numbers each; area.
-    pub numbers: [f64; 19],
-}
+/// Numbers of a [`Flat`].
+pub const FLAT: usize = 19;
+
+/// An emitting triangle of even radiance, as packets take it: corner, edge, edge, normal, radiance to the front, radiance to
+/// the back, three numbers each; area.
+pub type Flat<S> = [S; FLAT];
 
 impl Emitter {
     /// What packets need of a triangle of even radiance.
-    pub fn flat(&self, looks: &Looks<'_>) -> Option<Flat> {
+    pub fn flat<S: Real>(&self, looks: &Looks<'_>) -> Option<Flat<S>> {
         let Self::Triangle { corner, edges, normal, area, material, .. } = *self else { return None };
         if looks.has_pictured_emission(material) || looks.is_holed(material) {
             return None;
         }
-        let mut numbers = [0.0; 19];
+        let mut numbers = [S::ZERO; FLAT];
         let vectors = [
             corner,
             edges[0],
@@ -103,9 +102,9 @@ impl Emitter {
             looks.plain_emission(material, false),
         ];
         for (to, from) in numbers.iter_mut().zip(vectors.iter().flat_map(|v| v.to_array()).chain([area])) {
-            *to = from;
+            *to = S::from_f64(from);
         }
-        Some(Flat { numbers })
+        Some(numbers)
     }
 
     /// The image of a triangle with `corners`.
@@ -139,6 +138,11 @@ impl Emitter {
         } else {
             Self::Unaimed
         }
+    }
+
+    /// Whether its light comes from infinitely far.
+    pub fn is_far(&self) -> bool {
+        matches!(self, Self::Light(Light::Directional { .. } | Light::Sun { .. }))
     }
 
     /// Power, roughly: what chances go by. `radius`: of the scene, scene units.

@@ -17,10 +17,10 @@ use crate::shade::look::Looks;
 type Run = (u32, u32, u32);
 
 /// Everything that shines.
-pub struct Lights<'a> {
+pub struct Lights<'a, S> {
     emitters: Vec<Emitter>,
     /// Parallel to the emitters: what packets need of those that are even triangles.
-    flats: Vec<Option<Flat>>,
+    flats: Vec<Option<Flat<S>>>,
     alias: Alias,
     /// Per placement: the number of its first emitting primitive in the list; `u32::MAX` if it has none.
     first: Vec<u32>,
@@ -34,10 +34,10 @@ pub struct Lights<'a> {
     background: DVec3,
 }
 
-impl<'a> Lights<'a> {
+impl<'a, S: Real> Lights<'a, S> {
     /// The lights of `description` and the emitting surfaces of `world`; where nothing shines, a sky of radiance 1 in
     /// all directions.
-    pub fn new<S: Real>(world: &World<S>, description: &'a Description, looks: &Looks<'_>) -> Self {
+    pub fn new(world: &World<S>, description: &'a Description, looks: &Looks<'_>) -> Self {
         let (runs, first, mut emitters) = surfaces(world, looks);
         emitters.extend(description.lights.iter().map(|&light| Emitter::Light(light)));
         let is_dark = emitters.is_empty() && description.environment.is_none() && description.background == DVec3::ZERO;
@@ -48,6 +48,7 @@ impl<'a> Lights<'a> {
         let radius = world.bounds().map_or(1.0, |(lo, hi)| 0.5 * (hi - lo).length()).max(1e-30);
         let mut weights: Vec<f64> = emitters.iter().map(|e| e.power(radius, looks)).collect();
         weights.extend(sky.as_ref().map(|sky| sky.brightness() * PI * radius * radius));
+        share(&mut weights, |i| emitters.get(i).is_none_or(Emitter::is_far));
         let flats = emitters.iter().map(|e| e.flat(looks)).collect();
         Self {
             emitters,
@@ -71,7 +72,7 @@ impl<'a> Lights<'a> {
 
     /// Light `index`, if it is a triangle that shines evenly.
     #[inline]
-    pub fn flat(&self, index: usize) -> Option<&Flat> {
+    pub fn flat(&self, index: usize) -> Option<&Flat<S>> {
         self.flats.get(index)?.as_ref()
     }
 
@@ -81,7 +82,7 @@ impl<'a> Lights<'a> {
     }
 
     /// Aims from `from` at light `index`, whose chance is `chance`.
-    pub fn aim<S: Real>(
+    pub fn aim(
         &self,
         from: DVec3,
         (index, chance): (usize, f64),
@@ -91,8 +92,8 @@ impl<'a> Lights<'a> {
     ) -> Option<Aim> {
         let aim = if index == self.sky_index {
             let sky = self.sky.as_ref()?;
-            let (dir, pdf) = sky.sample(place)?;
-            Aim { target: dir, is_far: true, dir, pdf, radiance: sky.radiance(dir), is_point: false }
+            let (dir, radiance, pdf) = sky.sample(place)?;
+            Aim { target: dir, is_far: true, dir, pdf, radiance, is_point: false }
         } else {
             self.emitters[index].aim(from, place, world, looks)?
         };
@@ -102,15 +103,7 @@ impl<'a> Lights<'a> {
 
     /// Density with which [`Self::aim`] from `from` finds the hit at `to`, unit geometric normal `ng`, on primitive
     /// `prim` of instance `inst`: per solid angle; 0 if it never does.
-    pub fn pdf_of_hit<S: Real>(
-        &self,
-        from: DVec3,
-        to: DVec3,
-        ng: DVec3,
-        prim: u32,
-        inst: u32,
-        world: &World<S>,
-    ) -> f64 {
+    pub fn pdf_of_hit(&self, from: DVec3, to: DVec3, ng: DVec3, prim: u32, inst: u32, world: &World<S>) -> f64 {
         let first = self.first[inst as usize];
         if first == u32::MAX {
             return 0.0;
@@ -125,15 +118,18 @@ impl<'a> Lights<'a> {
         self.alias.chance(index) * self.emitters[index].pdf(from, to, ng)
     }
 
-    /// Radiance of a ray that leaves the scene in direction `dir` (unit): each source of it times `weight` of the
+    /// Radiance of a ray that leaves the scene in direction `dir` (need not be unit): each source of it times `weight` of the
     /// density per solid angle with which [`Self::aim`] finds it there.
     pub fn beyond(&self, dir: DVec3, weight: impl Fn(f64) -> f64) -> DVec3 {
         let mut sum = match &self.sky {
             None => self.background * weight(0.0),
-            Some(sky) => sky.radiance(dir) * weight(self.alias.chance(self.sky_index) * sky.pdf(dir)),
+            Some(sky) => {
+                let (radiance, pdf) = sky.seen(dir);
+                radiance * weight(self.alias.chance(self.sky_index) * pdf)
+            }
         };
         for &sun in &self.suns {
-            if let Some((radiance, pdf)) = self.emitters[sun].sun(dir) {
+            if let Some((radiance, pdf)) = self.emitters[sun].sun(dir.normalize_or_zero()) {
                 sum += radiance * weight(self.alias.chance(sun) * pdf);
             }
         }
@@ -200,4 +196,30 @@ pub(super) fn in_cone(axis: DVec3, height: f64, place: [f64; 2]) -> DVec3 {
     let [x, y] = crate::camera::sampling::orthonormal_basis(axis);
     let (s, c) = (TAU * place[1]).sin_cos();
     x * (sin * c) + y * (sin * s) + axis * (1.0 - below)
+}
+
+/// Weighs light from afar (`is_far`) down to that of the scene's own lights: what falls on the whole scene is more than
+/// what arrives at a place in it, of which lamps close by give more than their part.
+fn share(weights: &mut [f64], is_far: impl Fn(usize) -> bool) {
+    let of = |far: bool| (0..weights.len()).filter(|&i| is_far(i) == far).map(|i| weights[i]).sum::<f64>();
+    let (near, far) = (of(false), of(true));
+    if 0.0 < near && near < far && far.is_finite() {
+        (0..weights.len()).filter(|&i| is_far(i)).for_each(|i| weights[i] *= near / far);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_from_afar_is_chosen_as_often_as_lamps_at_most() {
+        let shared = |mut weights: [f64; 4]| {
+            share(&mut weights, |i| i >= 2);
+            weights
+        };
+        assert_eq!(shared([1.0, 3.0, 30.0, 10.0]), [1.0, 3.0, 3.0, 1.0]);
+        assert_eq!(shared([1.0, 3.0, 2.0, 1.0]), [1.0, 3.0, 2.0, 1.0]);
+        assert_eq!(shared([0.0, 0.0, 2.0, 1.0]), [0.0, 0.0, 2.0, 1.0]);
+    }
 }

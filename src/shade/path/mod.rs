@@ -17,7 +17,6 @@ mod emitter;
 mod lights;
 mod points;
 mod scatter;
-mod shapes;
 mod sky;
 pub(super) mod wave;
 
@@ -34,19 +33,19 @@ use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
 };
 use self::lights::Lights;
-use self::points::{BASE, FIELDS, NORMAL, OFFSET, OUT, PARAM, POSITION, Points, SHADING, SQUEEZE, THROUGHPUT};
-use self::scatter::Chances;
-use self::shapes::ShapePoints;
+use self::points::{LookNumbers, Places, Points, look_numbers};
+use self::scatter::{Arrivals, Chances};
 use self::wave::{Shadows, Wave};
-use super::bare::BareTriangles;
 use super::look::{Look, Looks, Model};
+use super::meeting::{Meeting, Met, met_lanes};
 use super::offset::position_error;
 use super::sample::Sample;
 use super::shader::{Settings, Workspace};
 use super::stats::BounceStats;
 use super::through::{Again, MIXTURE, Through, number};
 use crate::camera::sobol::PixelPoints;
-use crate::lanes::Real;
+use crate::lanes::chosen::lanes_of;
+use crate::lanes::{Lanes, Real};
 use crate::ray::{Hits, Rays};
 use crate::scene::description::{Description, Material};
 use crate::scene::material::Scattering;
@@ -61,7 +60,7 @@ pub(super) struct Paths<'a, S: Real> {
     world: &'a World<S>,
     engine: &'a dyn Engine<S>,
     looks: Arc<Looks<'a>>,
-    lights: Lights<'a>,
+    lights: Lights<'a, S>,
     facets: FacetsList,
     /// Scatterings of a path at most.
     depth: u32,
@@ -69,16 +68,18 @@ pub(super) struct Paths<'a, S: Real> {
     /// Whether properties of first hits are wanted besides radiance.
     first_hits: bool,
     shadow_end: S,
-    /// Whether some hits come out of the world in lanes.
-    has_facets: bool,
-    bare: BareTriangles<S>,
+    meeting: Meeting<S>,
+    /// What the sides of materials scatter with, as [`Looks::sides`] lists them.
+    sides: Vec<LookNumbers<S>>,
 }
 
 /// One thread's arrays, reused from wave to wave.
 #[derive(Debug)]
 pub(super) struct PathMemory<S> {
-    points: [Points<S>; Model::COUNT],
-    shapes: ShapePoints<S>,
+    points: [Points; Model::COUNT],
+    places: Places<S>,
+    /// What points of textured materials scatter with, numbered after the sides.
+    looks: Vec<LookNumbers<S>>,
     pixels: Vec<PixelPoints>,
     now: Wave<S>,
     next: Wave<S>,
@@ -90,7 +91,8 @@ impl<S: Real> Default for PathMemory<S> {
     fn default() -> Self {
         Self {
             points: std::array::from_fn(|_| Points::default()),
-            shapes: ShapePoints::default(),
+            places: Places::default(),
+            looks: Vec::new(),
             pixels: Vec::new(),
             now: Wave::default(),
             next: Wave::default(),
@@ -115,8 +117,9 @@ impl<'a, S: Real> Paths<'a, S> {
         let facets = FacetsList::new(&looks.rough, description.materials.iter().any(is_of_all_widths));
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
         let Settings { depth, seed, first_hits, .. } = *settings;
-        let (has_facets, bare) = (world.has_facets(), BareTriangles::new(world, &looks, settings.rays));
-        Self { world, engine, looks, lights, facets, depth, seed, first_hits, shadow_end, has_facets, bare }
+        let meeting = Meeting::new(world, &looks, settings.rays);
+        let sides = looks.sides().map(|look| look_numbers(look.base, &look.param)).collect();
+        Self { world, engine, looks, lights, facets, depth, seed, first_hits, shadow_end, meeting, sides }
     }
 
     /// The radiance along each ray of the primary batch `rays` into `out`, which holds misses; see
@@ -160,11 +163,7 @@ impl<'a, S: Real> Paths<'a, S> {
             number(pixels[paths[i] as usize], sample, bounce, layer)
         });
         let traced = clock.elapsed();
-        memory.points.iter_mut().for_each(Points::clear);
-        memory.shapes.set(self.has_facets.then_some(self.world), &memory.now.rays, &work.hits);
-        for i in 0..memory.now.path.len() {
-            self.arrive(i, bounce, sample, memory, &work.hits, out);
-        }
+        self.arrive_all(bounce, sample, memory, &work.hits, out);
         let mut stats = BounceStats { rays: live, tracing: traced, ..BounceStats::default() };
         let count: usize = memory.points.iter().map(Points::len).sum();
         stats.points = count as u64;
@@ -200,30 +199,94 @@ impl<'a, S: Real> Paths<'a, S> {
     fn scatter_all(&self, bounce: u32, sample: u32, memory: &mut PathMemory<S>) -> u64 {
         let chances = Chances { points: &memory.pixels, sample, bounce };
         let (next, shadows) = (&mut memory.next, &mut memory.shadows);
+        let looks = [&self.sides[..], &memory.looks];
+        let arrivals = Arrivals { wave: &memory.now, places: &memory.places, looks };
         let mut lanes = 0;
-        for (model, points) in memory.points.iter_mut().enumerate() {
+        for (model, points) in memory.points.iter().enumerate() {
             if points.len() == 0 {
                 continue;
             }
-            points.settle();
-            let width = <S::Wide as crate::lanes::Lanes>::N;
+            let width = <S::Wide as Lanes>::N;
             lanes += points.len().next_multiple_of(width) as u64;
             match Model::ALL[model] {
-                Model::Matte => self.scatter::<Matte<S::Wide>>(points, &chances, next, shadows),
-                Model::SmoothConductor => self.scatter::<SmoothConductor<S::Wide>>(points, &chances, next, shadows),
-                Model::RoughConductor => self.scatter::<RoughConductor<S::Wide>>(points, &chances, next, shadows),
-                Model::SmoothDielectric => self.scatter::<SmoothDielectric<S::Wide>>(points, &chances, next, shadows),
-                Model::RoughDielectric => self.scatter::<RoughDielectric<S::Wide>>(points, &chances, next, shadows),
-                Model::Thin => self.scatter::<Thin<S::Wide>>(points, &chances, next, shadows),
-                Model::SmoothCoat => self.scatter::<SmoothCoat<S::Wide>>(points, &chances, next, shadows),
-                Model::RoughCoat => self.scatter::<RoughCoat<S::Wide>>(points, &chances, next, shadows),
-                Model::MetalRough => self.scatter::<MetalRough<S::Wide>>(points, &chances, next, shadows),
+                Model::Matte => self.scatter::<Matte<S::Wide>>(points, &arrivals, &chances, next, shadows),
+                Model::SmoothConductor => {
+                    self.scatter::<SmoothConductor<S::Wide>>(points, &arrivals, &chances, next, shadows)
+                }
+                Model::RoughConductor => {
+                    self.scatter::<RoughConductor<S::Wide>>(points, &arrivals, &chances, next, shadows)
+                }
+                Model::SmoothDielectric => {
+                    self.scatter::<SmoothDielectric<S::Wide>>(points, &arrivals, &chances, next, shadows)
+                }
+                Model::RoughDielectric => {
+                    self.scatter::<RoughDielectric<S::Wide>>(points, &arrivals, &chances, next, shadows)
+                }
+                Model::Thin => self.scatter::<Thin<S::Wide>>(points, &arrivals, &chances, next, shadows),
+                Model::SmoothCoat => self.scatter::<SmoothCoat<S::Wide>>(points, &arrivals, &chances, next, shadows),
+                Model::RoughCoat => self.scatter::<RoughCoat<S::Wide>>(points, &arrivals, &chances, next, shadows),
+                Model::MetalRough => self.scatter::<MetalRough<S::Wide>>(points, &arrivals, &chances, next, shadows),
             }
         }
         lanes
     }
 
-    /// Ray `i` of the wave has arrived: adds what shines there, and the point to those that scatter.
+    /// The rays of the wave have arrived: adds what shines there, and the points to those that scatter.
+    fn arrive_all(&self, bounce: u32, sample: u32, memory: &mut PathMemory<S>, hits: &Hits<S>, out: &mut [Sample]) {
+        memory.points.iter_mut().for_each(Points::clear);
+        memory.looks.clear();
+        memory.places.open(memory.now.rays.padded_len());
+        let count = memory.now.path.len();
+        for first in (0..count).step_by(S::Wide::N) {
+            let hit = met_lanes(hits, first);
+            for i in first..count.min(first + S::Wide::N) {
+                if hit >> (i - first) & 1 == 0 {
+                    self.leave(i, bounce, &memory.now, out);
+                }
+            }
+            if hit == 0 {
+                continue;
+            }
+            let Met { place, material, known } =
+                self.meeting.places(self.world, &self.looks, &memory.now.rays, hits, first, hit);
+            memory.places.put_lanes(first, &place);
+            for lane in lanes_of(hit) {
+                let even = self.looks.even_side(material[lane], place.front >> lane & 1 != 0);
+                let Some((look, model)) = even.filter(|_| known >> lane & 1 != 0) else {
+                    self.arrive(first + lane, bounce, sample, memory, hits, out);
+                    continue;
+                };
+                if bounce == 0 {
+                    let seen = &mut out[memory.now.path[first + lane] as usize];
+                    seen.alpha = 1.0;
+                    if self.first_hits {
+                        let (org, dir) = memory.now.line(first + lane);
+                        self.met(first + lane, org, dir, hits).resolved(self, material[lane], dir).show(
+                            first + lane,
+                            dir,
+                            hits,
+                            seen,
+                        );
+                    }
+                }
+                if bounce < self.depth {
+                    memory.points[model as usize].push(first + lane, look);
+                }
+            }
+        }
+    }
+
+    /// Ray `i` of the wave has left the scene.
+    fn leave(&self, i: usize, bounce: u32, wave: &Wave<S>, out: &mut [Sample]) {
+        let light = self.lights.beyond(wave.line(i).1, |light| wave.weight(i, light));
+        let seen = &mut out[wave.path[i] as usize];
+        seen.shine(bounce, wave.throughput(i) * light);
+        if bounce == 0 && light != DVec3::ZERO {
+            seen.alpha = 1.0;
+        }
+    }
+
+    /// Ray `i` of the wave has arrived where lanes do not know what there is.
     fn arrive(
         &self,
         i: usize,
@@ -234,65 +297,16 @@ impl<'a, S: Real> Paths<'a, S> {
         out: &mut [Sample],
     ) {
         let wave = &memory.now;
-        let (path, throughput) = (wave.path[i], DVec3::from(wave.throughput[i].map(S::to_f64)));
-        let (org, dir) = (DVec3::from(wave.rays.org(i).map(S::to_f64)), DVec3::from(wave.rays.dir(i).map(S::to_f64)));
-        let pdf = wave.pdf[i].to_f64();
-        // The power heuristic against a density with which a light would have been aimed at.
-        let weight = |light: f64| if pdf.is_infinite() { 1.0 } else { 1.0 / (1.0 + (light / pdf).powi(2)) };
+        let (path, (org, dir)) = (wave.path[i], wave.line(i));
         let seen = &mut out[path as usize];
-        let mut shine = |light: DVec3| {
-            if light != DVec3::ZERO && light.is_finite() {
-                seen.radiance += light;
-                if bounce <= 1 {
-                    seen.direct += light;
-                }
-            }
-        };
-        if !hits.is_hit(i) {
-            let light = self.lights.beyond(dir.normalize_or_zero(), weight);
-            shine(throughput * light);
-            if bounce == 0 && light != DVec3::ZERO {
-                seen.alpha = 1.0;
-            }
-            return;
-        }
-        let (prim, inst) = (hits.prim[i], hits.inst[i]);
-        let first_seen = |material: u32, seen: &mut Sample| {
-            if bounce == 0 {
-                seen.alpha = 1.0;
-                if self.first_hits {
-                    self.met(i, org, dir, hits).resolved(self, material, dir).show(i, dir, hits, seen);
-                }
-            }
-        };
-        if bounce < self.depth {
-            if let Some((material, from_front)) = memory.shapes.get(i)
-                && let Some(look) = self.looks.even(material, from_front)
-            {
-                first_seen(material, seen);
-                let fields = memory.shapes.fields(i, wave, look);
-                memory.points[look.model as usize].push(path, &fields, false);
-                return;
-            }
-            if let Some(bare) = self.bare.get(self.world, &self.looks, prim, inst)
-                && let Some(look) = self.looks.uniform(bare.material)
-            {
-                first_seen(bare.material, seen);
-                let fields = wave.raw_fields(i, hits, &bare.numbers, look);
-                memory.points[look.model as usize].push(path, &fields, true);
-                return;
-            }
-        }
         let met = self.met(i, org, dir, hits);
         let surface = &met.surface;
         let emitted = self.looks.emission(surface.material, surface, met.from_front);
         if emitted != DVec3::ZERO {
-            let light = if pdf.is_infinite() {
-                0.0
-            } else {
-                self.lights.pdf_of_hit(org, surface.position, surface.ng, prim, inst, self.world)
-            };
-            shine(throughput * emitted * weight(light));
+            let (prim, inst) = (hits.prim[i], hits.inst[i]);
+            let pdf = || self.lights.pdf_of_hit(org, surface.position, surface.ng, prim, inst, self.world);
+            let pdf = if wave.pdf[i].is_finite() { pdf() } else { 0.0 };
+            seen.shine(bounce, wave.throughput(i) * emitted * wave.weight(i, pdf));
         }
         if bounce > 0 && bounce == self.depth {
             return;
@@ -318,30 +332,21 @@ impl<'a, S: Real> Paths<'a, S> {
         let t = hits.t[i].to_f64();
         let error = position_error::<S>(org, dir, t, surface.position, surface.magnitude)
             + surface.position.abs() * (2.0 * S::EPSILON.to_f64());
-        let mut fields = [S::ZERO; FIELDS];
-        let mut put = |at: usize, v: DVec3| (0..3).for_each(|axis| fields[at + axis] = S::from_f64(v[axis]));
-        put(POSITION, surface.position);
-        put(SHADING, ns);
-        put(NORMAL, ng);
-        put(OUT, -dir.normalize_or_zero());
-        put(BASE, look.base);
-        (0..7).for_each(|k| fields[PARAM + k] = S::from_f64(look.param[k]));
-        fields[OFFSET] = S::from_f64(ng.abs().dot(error));
-        fields[THROUGHPUT..THROUGHPUT + 3].copy_from_slice(&wave.throughput[i]);
-        fields[SQUEEZE] = wave.squeeze[i];
-        memory.points[look.model as usize].push(path, &fields, false);
+        memory.places.put(i, [surface.position, ng, ns], ng.abs().dot(error));
+        memory.points[look.model as usize].push(i, (self.sides.len() + memory.looks.len()) as u32);
+        memory.looks.push(look_numbers(look.base, &look.param));
     }
 
     /// What ray `i`, in f64 `org` and `dir`, has hit.
-    fn met(&self, i: usize, org: DVec3, dir: DVec3, hits: &Hits<S>) -> Met<'_> {
+    fn met(&self, i: usize, org: DVec3, dir: DVec3, hits: &Hits<S>) -> Seen<'_> {
         let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
         let surface = self.world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);
-        Met { surface, from_front: surface.ng.dot(dir) <= 0.0 }
+        Seen { surface, from_front: surface.ng.dot(dir) <= 0.0 }
     }
 }
 
 /// A surface, and whether it is seen from the side of its normal.
-struct Met<'w> {
+struct Seen<'w> {
     surface: Surface<'w>,
     from_front: bool,
 }
@@ -355,7 +360,7 @@ struct Arrival<'w> {
     look: Look,
 }
 
-impl<'w> Met<'w> {
+impl<'w> Seen<'w> {
     /// The same of material `material`, no mixture, seen along `dir`.
     fn resolved<S: Real>(self, paths: &Paths<'_, S>, material: u32, dir: DVec3) -> Arrival<'w> {
         let Self { surface, from_front } = self;
@@ -381,9 +386,9 @@ impl<S: Real> PathMemory<S> {
     /// The primary rays as the first wave.
     fn start(&mut self, rays: &Rays<S>) {
         self.now.open(rays.len());
-        for i in 0..rays.len() {
-            if rays.is_live(i) {
-                self.now.push(i as u32, rays.org(i), rays.dir(i), [S::ONE; 3], S::INFINITY, S::ONE);
+        for first in (0..rays.padded_len()).step_by(S::Wide::N) {
+            for i in lanes_of(rays.live_lanes(first)).map(|lane| first + lane) {
+                self.now.start(i as u32, rays.org(i), rays.dir(i));
             }
         }
         self.now.close();

@@ -1,127 +1,146 @@
-//! Points on surfaces in packets, one list per model of scattering, so that a packet has one model.
+//! Points on surfaces that the rays of a wave met: where they are, in the order of the rays, and lists of them for each model
+//! of scattering, so that a packet has one model.
 
-use crate::lanes::space::normalize;
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, map3};
+use glam::DVec3;
+
+use crate::lanes::chosen::{Picked, records};
+use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
 use crate::shade::place::Place;
 
-/// First field of the position, world space.
-pub const POSITION: usize = 0;
-/// Unit shading normal, on the side the light is seen from.
-pub const SHADING: usize = 3;
-/// Unit geometric normal, on that side.
-pub const NORMAL: usize = 6;
-/// Unit direction to where the light goes.
-pub const OUT: usize = 9;
-/// Base colour.
-pub const BASE: usize = 12;
-/// Further parameters of the model, seven.
-pub const PARAM: usize = 15;
-/// How far a ray must start from the position along the geometric normal.
-pub const OFFSET: usize = 22;
-/// What of the point's radiance reaches the eye.
-pub const THROUGHPUT: usize = 23;
-/// Product of the squared relative indices of refraction that the throughput was divided by.
-pub const SQUEEZE: usize = 26;
-/// Number of fields.
-pub const FIELDS: usize = 27;
+/// Numbers of a look: base colour, seven parameters.
+pub const NUMBERS: usize = 10;
 
-// What a raw point has instead, until it is settled.
+/// What a point scatters with, but for the model.
+pub type LookNumbers<S> = [S; NUMBERS];
 
-/// First corner of the triangle, world space, and the edges from it to the second and the third.
-pub const RAW_TRIANGLE: usize = POSITION;
-/// Direction of the ray.
-pub const RAW_DIR: usize = OUT;
-/// Weights of the second and third corner, parameter of the hit.
-pub const RAW_PLACE: usize = PARAM + 4;
+/// `base` and `param` in one list.
+#[inline]
+pub fn look_numbers<S: Real>(base: DVec3, param: &[f64; 7]) -> LookNumbers<S> {
+    let mut numbers = [S::ZERO; NUMBERS];
+    let all = base.to_array().into_iter().chain(*param);
+    numbers.iter_mut().zip(all).for_each(|(to, from)| *to = S::from_f64(from));
+    numbers
+}
 
-/// One point's fields.
-pub type Fields<S> = [S; FIELDS];
+/// What the points of a packet scatter with, but for the model.
+#[derive(Clone, Copy, Debug)]
+pub struct LookLanes<V> {
+    /// Base colour.
+    pub base: Lanes3<V>,
+    /// Parameters of the model.
+    pub param: [V; 7],
+}
 
-/// Sixteen points.
-#[derive(Clone, Debug)]
-struct Block<S> {
-    fields: [[S; MAX_LANES]; FIELDS],
-    /// Bit `i`: point `i` is raw.
-    raw: u32,
+impl<V: Lanes> LookLanes<V> {
+    /// Of points that look like the entries `which`, at most `N` of them, of two lists as one.
+    #[inline(always)]
+    pub fn of([list, more]: [&[LookNumbers<V::Scalar>]; 2], which: &[u32]) -> Self {
+        let entry = |k: u32| list.get(k as usize).unwrap_or_else(|| &more[k as usize - list.len()]);
+        let mut key = [0; MAX_LANES];
+        key.iter_mut().zip(which).for_each(|(key, &which)| *key = which);
+        let [r, g, b, p0, p1, p2, p3, p4, p5, p6] = records((1 << which.len()) - 1, &key, entry);
+        Self { base: [r, g, b], param: [p0, p1, p2, p3, p4, p5, p6] }
+    }
+
+    /// Three parameters from number `k` on.
+    #[inline(always)]
+    pub fn three(&self, k: usize) -> Lanes3<V> {
+        [self.param[k], self.param[k + 1], self.param[k + 2]]
+    }
 }
 
 /// Points of one model.
 #[derive(Clone, Debug, Default)]
-pub struct Points<S> {
-    blocks: Vec<Block<S>>,
-    /// Path of each point.
-    pub path: Vec<u32>,
+pub struct Points {
+    /// The ray of the wave that met each.
+    pub ray: Vec<u32>,
+    /// The look of each, by number.
+    pub look: Vec<u32>,
 }
 
-impl<S: Real> Points<S> {
-    /// No points, keeping the memory.
+impl Points {
+    /// None, keeping the memory.
     pub fn clear(&mut self) {
-        self.blocks.clear();
-        self.path.clear();
+        self.ray.clear();
+        self.look.clear();
     }
 
     /// Number of points.
     pub fn len(&self) -> usize {
-        self.path.len()
+        self.ray.len()
     }
 
-    /// Adds a point of path `path`. A raw one, on a triangle without shading normals, has [`RAW_TRIANGLE`] and so on
-    /// instead of position, normals, direction and offset; its model has at most four parameters.
-    #[inline]
-    pub fn push(&mut self, path: u32, fields: &Fields<S>, is_raw: bool) {
-        let lane = self.path.len() % MAX_LANES;
-        if lane == 0 {
-            self.blocks.push(Block { fields: [[S::ZERO; MAX_LANES]; FIELDS], raw: 0 });
-        }
-        self.path.push(path);
-        if let Some(block) = self.blocks.last_mut() {
-            for (column, &value) in block.fields.iter_mut().zip(fields) {
-                column[lane] = value;
-            }
-            block.raw |= u32::from(is_raw) << lane;
-        }
-    }
-
-    /// Computes position, normals, direction and offset of the raw points.
-    pub fn settle(&mut self) {
-        for block in self.blocks.iter_mut().filter(|block| block.raw != 0) {
-            for first in (0..MAX_LANES).step_by(S::Wide::N) {
-                settle(block, first);
-            }
-        }
-    }
-
-    /// Field `field` of points `first..first + N`.
+    /// Adds the point that ray `ray` met.
     #[inline(always)]
-    pub fn scalar<V: Lanes<Scalar = S>>(&self, field: usize, first: usize) -> V {
-        V::load(&self.blocks[first / MAX_LANES].fields[field][first % MAX_LANES..])
-    }
-
-    /// Fields `field..field + 3` of the same.
-    #[inline(always)]
-    pub fn vector<V: Lanes<Scalar = S>>(&self, field: usize, first: usize) -> Lanes3<V> {
-        [0, 1, 2].map(|i| self.scalar(field + i, first))
+    pub fn push(&mut self, ray: usize, look: u32) {
+        self.ray.push(ray as u32);
+        self.look.push(look);
     }
 }
 
-#[inline(always)]
-fn settle<S: Real>(block: &mut Block<S>, first: usize) {
-    let scalar = |field: usize| S::Wide::load(&block.fields[field][first..]);
-    let vector = |field: usize| [0, 1, 2].map(|i| scalar(field + i));
-    let raw = <S::Wide as Lanes>::Mask::from_bits(block.raw >> first);
-    let (corner, e1, e2) = (vector(RAW_TRIANGLE), vector(RAW_TRIANGLE + 3), vector(RAW_TRIANGLE + 6));
-    let ([u, v, t], dir) = (vector(RAW_PLACE), vector(RAW_DIR));
-    let out = normalize(map3(dir, |x| -x));
-    let Place { position, normal, offset, .. } = Place::on_triangle([corner, e1, e2], [u, v, t], dir);
-    let mut put = |field: usize, value: S::Wide| {
-        let column = &mut block.fields[field][first..];
-        S::Wide::select(raw, value, S::Wide::load(column)).store(column);
-    };
-    for axis in 0..3 {
-        put(POSITION + axis, position[axis]);
-        put(SHADING + axis, normal[axis]);
-        put(NORMAL + axis, normal[axis]);
-        put(OUT + axis, out[axis]);
+/// First row of the position, world space.
+const POSITION: usize = 0;
+/// Unit geometric normal, on the side the light is seen from.
+const NORMAL: usize = 3;
+/// Unit shading normal, on that side.
+const SHADING: usize = 6;
+/// How far a ray must start from the position along the geometric normal.
+const OFFSET: usize = 9;
+/// Number of rows.
+const ROWS: usize = 10;
+
+/// Where the rays of a wave met surfaces, parallel to them; rays that met nothing have unspecified places.
+#[derive(Clone, Debug, Default)]
+pub struct Places<S> {
+    rows: [Vec<S>; ROWS],
+}
+
+/// Where the points of a packet are.
+#[derive(Clone, Copy, Debug)]
+pub struct PlaceLanes<V> {
+    /// World space.
+    pub position: Lanes3<V>,
+    /// Unit geometric normal, on the side the light is seen from.
+    pub normal: Lanes3<V>,
+    /// Unit shading normal, on that side.
+    pub shading: Lanes3<V>,
+    /// How far a ray must start from the position along the geometric normal.
+    pub offset: V,
+}
+
+impl<S: Real> Places<S> {
+    /// Makes room for those of `padded` rays with their padding.
+    pub fn open(&mut self, padded: usize) {
+        self.rows.iter_mut().for_each(|row| row.resize(padded, S::ZERO));
     }
-    put(OFFSET, offset);
+
+    /// Sets those of rays `first..first + N`.
+    #[inline(always)]
+    pub fn put_lanes(&mut self, first: usize, place: &Place<S::Wide>) {
+        // Written out: a chain of iterators over vectors goes through memory one by one.
+        for axis in 0..3 {
+            place.position[axis].store(&mut self.rows[POSITION + axis][first..]);
+            place.normal[axis].store(&mut self.rows[NORMAL + axis][first..]);
+            place.normal[axis].store(&mut self.rows[SHADING + axis][first..]);
+        }
+        place.offset.store(&mut self.rows[OFFSET][first..]);
+    }
+
+    /// Sets that of ray `i`.
+    pub fn put(&mut self, i: usize, [position, normal, shading]: [DVec3; 3], offset: f64) {
+        let rows = [position, normal, shading].into_iter().flat_map(|v| v.to_array()).chain([offset]);
+        self.rows.iter_mut().zip(rows).for_each(|(row, x)| row[i] = S::from_f64(x));
+    }
+
+    /// Those of some rays.
+    #[inline(always)]
+    pub fn of(&self, rays: &Picked) -> PlaceLanes<S::Wide> {
+        let [px, py, pz, nx, ny, nz, sx, sy, sz, offset] = &self.rows;
+        PlaceLanes {
+            position: rays.take3([px, py, pz]),
+            normal: rays.take3([nx, ny, nz]),
+            shading: rays.take3([sx, sy, sz]),
+            offset: rays.take(offset),
+        }
+    }
 }

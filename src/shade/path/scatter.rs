@@ -4,12 +4,13 @@ use glam::DVec3;
 
 use super::Paths;
 use super::bsdf::Bsdf;
-use super::points::{NORMAL, OFFSET, OUT, POSITION, Points, SHADING, SQUEEZE, THROUGHPUT};
+use super::emitter::FLAT;
+use super::points::{LookLanes, LookNumbers, PlaceLanes, Places, Points};
 use super::wave::{Shadows, Wave};
 use crate::camera::sobol::{PixelPoints, fraction};
-use crate::lanes::chosen::{Chosen, at, spill};
-use crate::lanes::space::{Frame, choose, scale, sub};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot};
+use crate::lanes::chosen::{Chosen, Picked, at, columns, spill};
+use crate::lanes::space::{Frame, choose, normalize, scale, sub};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, map3};
 
 /// Bounces before paths may end by chance.
 const FIRST_ROULETTE: u32 = 3;
@@ -75,11 +76,19 @@ impl Chances<'_> {
     }
 }
 
+/// What a wave has arrived at.
+pub struct Arrivals<'a, S> {
+    /// Its rays.
+    pub wave: &'a Wave<S>,
+    /// Where they met surfaces.
+    pub places: &'a Places<S>,
+    /// What is scattered with there: two lists as one.
+    pub looks: [&'a [LookNumbers<S>]; 2],
+}
+
 /// The points of a packet.
 struct Packet<V> {
-    position: Lanes3<V>,
-    normal: Lanes3<V>,
-    offset: V,
+    place: PlaceLanes<V>,
     throughput: Lanes3<V>,
     squeeze: V,
     frame: Frame<V>,
@@ -89,15 +98,18 @@ struct Packet<V> {
 
 impl<V: Lanes> Packet<V> {
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
-        let frame = Frame::new(points.vector(SHADING, first));
-        let [x, y, z] = frame.to_local(points.vector(OUT, first));
+    fn load<S: Real<Wide = V>>(arrivals: &Arrivals<'_, S>, rays: &Picked) -> Self
+    where
+        V: Lanes<Scalar = S>,
+    {
+        let Arrivals { wave, places, .. } = arrivals;
+        let place = places.of(rays);
+        let frame = Frame::new(place.shading);
+        let [x, y, z] = frame.to_local(normalize(map3(rays.take3(wave.rays.dir.each_ref()), |d: V| -d)));
         Self {
-            position: points.vector(POSITION, first),
-            normal: points.vector(NORMAL, first),
-            offset: points.scalar(OFFSET, first),
-            throughput: points.vector(THROUGHPUT, first),
-            squeeze: points.scalar(SQUEEZE, first),
+            place,
+            throughput: rays.take3(wave.throughput.each_ref()),
+            squeeze: rays.take(&wave.squeeze),
             frame,
             out: [x, y, z.fast_max(V::constant(1e-6))],
         }
@@ -108,9 +120,10 @@ impl<V: Lanes> Packet<V> {
     #[inline(always)]
     fn leave(&self, dir: Lanes3<V>, local: Lanes3<V>) -> (Lanes3<V>, V::Mask) {
         let zero = V::constant(0.0);
-        let side = dot(dir, self.normal);
-        let step = V::select(zero.cmp_lt(side), self.offset, -self.offset);
-        let org = [0, 1, 2].map(|i| self.normal[i].mul_add(step, self.position[i]));
+        let PlaceLanes { position, normal, offset, .. } = self.place;
+        let side = dot(dir, normal);
+        let step = V::select(zero.cmp_lt(side), offset, -offset);
+        let org = [0, 1, 2].map(|i| normal[i].mul_add(step, position[i]));
         (org, zero.cmp_lt(side * local[2]))
     }
 }
@@ -119,17 +132,20 @@ impl<S: Real> Paths<'_, S> {
     /// Scatters at all `points`: rays into `next`, shadow rays into `shadows`.
     pub(super) fn scatter<'t, B: Bsdf<'t, S::Wide>>(
         &'t self,
-        points: &Points<S>,
+        points: &Points,
+        arrivals: &Arrivals<'_, S>,
         chances: &Chances<'_>,
         next: &mut Wave<S>,
         shadows: &mut Shadows<S>,
     ) {
         let width = <S::Wide as Lanes>::N;
-        for first in (0..points.len()).step_by(width) {
-            let path = &points.path[first..points.len().min(first + width)];
+        for (rays, looks) in points.ray.chunks(width).zip(points.look.chunks(width)) {
+            let mut path = [0; MAX_LANES];
+            path.iter_mut().zip(rays).for_each(|(path, &ray)| *path = arrivals.wave.path[ray as usize]);
+            let path = &path[..rays.len()];
             let numbers = chances.numbers::<S>(path);
-            let packet = Packet::<S::Wide>::load(points, first);
-            let bsdf = B::load(points, first, &self.facets);
+            let packet = Packet::load(arrivals, &Picked::of::<S::Wide>(rays));
+            let bsdf = B::load(&LookLanes::of(arrivals.looks, looks), &self.facets);
             if !B::SMOOTH && !self.lights.is_empty() {
                 self.aim(&packet, &bsdf, path, &numbers, shadows);
             }
@@ -172,15 +188,13 @@ impl<S: Real> Paths<'_, S> {
         let zero = [S::ZERO; MAX_LANES];
         let (mut dir, mut radiance, mut target) = ([zero; 3], [zero; 3], [zero; 3]);
         // Without light the density is 1 and the radiance 0.
-        let (mut pdf, mut near, mut points, mut even) = ([S::ONE; MAX_LANES], zero, 0, 0);
-        let mut flat = [zero; 19];
-        let position = spill(packet.position);
+        let (mut pdf, mut near, mut points) = ([S::ONE; MAX_LANES], zero, 0);
+        let (mut lamps, mut even) = ([0; MAX_LANES], 0);
+        let position = spill(packet.place.position);
         for lane in 0..path.len() {
             let Some((index, chance)) = self.lights.choose(numbers.light_choice[lane].to_f64()) else { continue };
-            if let Some(triangle) = self.lights.flat(index) {
-                for (column, &number) in flat.iter_mut().zip(&triangle.numbers) {
-                    column[lane] = S::from_f64(number);
-                }
+            if self.lights.flat(index).is_some() {
+                lamps[lane] = index;
                 pdf[lane] = S::from_f64(chance);
                 even |= 1u32 << lane;
                 continue;
@@ -210,8 +224,13 @@ impl<S: Real> Paths<'_, S> {
             return others;
         }
         let light = [S::Wide::load(&numbers.light[0]), S::Wide::load(&numbers.light[1])];
-        let flat = flat.map(|column| S::Wide::load(&column));
-        on_triangles(packet.position, &flat, light, Mask::<S>::from_bits(even), &others)
+        let none = [S::ZERO; FLAT];
+        let columns = columns(even, |lane| self.lights.flat(lamps[lane]).unwrap_or(&none));
+        let mut flat = [S::Wide::constant(0.0); FLAT];
+        for (flat, column) in flat.iter_mut().zip(&columns) {
+            *flat = S::Wide::load(column);
+        }
+        on_triangles(packet.place.position, &flat, light, Mask::<S>::from_bits(even), &others)
     }
 }
 
@@ -240,7 +259,7 @@ struct Targets<V: Lanes> {
 #[inline(always)]
 fn on_triangles<V: Lanes>(
     from: Lanes3<V>,
-    flat: &[V; 19],
+    flat: &[V; FLAT],
     [u, v]: [V; 2],
     even: V::Mask,
     others: &Targets<V>,

@@ -1,6 +1,6 @@
 //! Light from an environment picture, sampled by its brightness.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::DVec3;
 
@@ -16,8 +16,12 @@ pub struct Sky<'a> {
     in_row: Vec<f32>,
     /// The same of whole rows.
     of_rows: Vec<f32>,
+    /// Cosines of the latitudes between rows.
+    edges: Vec<f64>,
     /// Integral of brightness over all directions.
     brightness: f64,
+    /// The radiance from all directions, if it is the same.
+    even: Option<DVec3>,
 }
 
 impl<'a> Sky<'a> {
@@ -26,13 +30,18 @@ impl<'a> Sky<'a> {
         let (columns, rows) = (environment.texture.width as usize, environment.texture.height as usize);
         let (mut in_row, mut of_rows) = (Vec::with_capacity(columns * rows), Vec::with_capacity(rows));
         let mut total = 0.0;
+        let edges: Vec<f64> = (0..=rows).map(|i| (PI * i as f64 / rows as f64).cos()).collect();
+        let texel = |column: usize, row: usize| {
+            environment.radiance_at([(column as f64 + 0.5) / columns as f64, (row as f64 + 0.5) / rows as f64])
+        };
+        let mut even = Some(texel(0, 0));
         for row in 0..rows {
-            let edge = |i: usize| (PI * i as f64 / rows as f64).cos();
-            let solid_angle = TAU / columns as f64 * (edge(row) - edge(row + 1));
+            let solid_angle = TAU / columns as f64 * (edges[row] - edges[row + 1]);
             let weights: Vec<f64> = (0..columns)
                 .map(|column| {
-                    let uv = [(column as f64 + 0.5) / columns as f64, (row as f64 + 0.5) / rows as f64];
-                    environment.radiance_at(uv).element_sum() / 3.0 * solid_angle
+                    let radiance = texel(column, row);
+                    even = even.filter(|first| *first == radiance);
+                    radiance.element_sum() / 3.0 * solid_angle
                 })
                 .collect();
             let sum: f64 = weights.iter().sum();
@@ -45,7 +54,7 @@ impl<'a> Sky<'a> {
             }));
         }
         let of_rows = of_rows.iter().map(|sum| (if total > 0.0 { sum / total } else { 1.0 }) as f32).collect();
-        Self { environment, columns, rows, in_row, of_rows, brightness: total }
+        Self { environment, columns, rows, in_row, of_rows, edges, brightness: total, even }
     }
 
     /// Integral of the radiance's brightness over all directions.
@@ -53,41 +62,50 @@ impl<'a> Sky<'a> {
         self.brightness
     }
 
-    /// Radiance from direction `dir` (where one looks; need not be unit).
-    pub fn radiance(&self, dir: DVec3) -> DVec3 {
-        self.environment.radiance(dir)
+    /// Radiance from direction `dir` (where one looks; need not be unit) and the density of [`Self::sample`] there.
+    pub fn seen(&self, dir: DVec3) -> (DVec3, f64) {
+        if let Some(radiance) = self.even {
+            return (radiance, if self.brightness > 0.0 { 0.25 * FRAC_1_PI } else { 0.0 });
+        }
+        let place = self.environment.place(dir);
+        (self.environment.radiance_at(place), self.pdf(place))
     }
 
-    /// A direction by brightness, unit, world space, and its density per solid angle.
-    pub fn sample(&self, place: [f64; 2]) -> Option<(DVec3, f64)> {
+    /// A direction by brightness, unit, world space, the radiance from there, and the density per solid angle.
+    pub fn sample(&self, place: [f64; 2]) -> Option<(DVec3, DVec3, f64)> {
         if self.brightness <= 0.0 {
             return None;
+        }
+        let toward = |longitude: f64, cos: f64| {
+            let sin = (1.0 - cos * cos).max(0.0).sqrt();
+            let (x, z) = longitude.sin_cos();
+            self.environment.to_world * DVec3::new(sin * x, cos, -sin * z)
+        };
+        if let Some(radiance) = self.even {
+            let dir = toward((place[0] - 0.5) * TAU, 1.0 - 2.0 * place[1]);
+            return Some((dir, radiance, 0.25 * FRAC_1_PI));
         }
         let (row, y) = invert(&self.of_rows, place[1]);
         let (column, x) = invert(&self.in_row[row * self.columns..][..self.columns], place[0]);
         let longitude = ((column as f64 + x) / self.columns as f64 - 0.5) * TAU;
         // Uniform in the cosine of the latitude within the row.
-        let edge = |i: usize| (PI * i as f64 / self.rows as f64).cos();
-        let cos = edge(row) + (edge(row + 1) - edge(row)) * y;
-        let sin = (1.0 - cos * cos).max(0.0).sqrt();
-        let local = DVec3::new(sin * longitude.sin(), cos, -sin * longitude.cos());
-        Some((self.environment.to_world * local, self.cell_pdf(row, column)))
+        let cos = self.edges[row] + (self.edges[row + 1] - self.edges[row]) * y;
+        let dir = toward(longitude, cos);
+        Some((dir, self.environment.radiance(dir), self.cell_pdf(row, column)))
     }
 
-    /// Density of [`Self::sample`] in direction `dir`.
-    pub fn pdf(&self, dir: DVec3) -> f64 {
+    /// Density of [`Self::sample`] at a place of the picture.
+    fn pdf(&self, [u, v]: [f64; 2]) -> f64 {
         if self.brightness <= 0.0 {
             return 0.0;
         }
-        let [u, v] = self.environment.place(dir);
         let cell = |x: f64, count: usize| ((x * count as f64) as usize).min(count - 1);
         self.cell_pdf(cell(v, self.rows), cell(u, self.columns))
     }
 
     fn cell_pdf(&self, row: usize, column: usize) -> f64 {
         let step = |sums: &[f32], i: usize| f64::from(sums[i]) - if i > 0 { f64::from(sums[i - 1]) } else { 0.0 };
-        let edge = |i: usize| (PI * i as f64 / self.rows as f64).cos();
-        let solid_angle = TAU / self.columns as f64 * (edge(row) - edge(row + 1));
+        let solid_angle = TAU / self.columns as f64 * (self.edges[row] - self.edges[row + 1]);
         let in_row = &self.in_row[row * self.columns..][..self.columns];
         step(&self.of_rows, row) * step(in_row, column) / solid_angle
     }
@@ -125,16 +143,37 @@ mod tests {
         let (mut by_light, mut uniform, mut area) = (DVec3::ZERO, DVec3::ZERO, 0.0);
         for k in 0..n {
             let u = random.spread(k, 0);
-            let (dir, pdf) = sky.sample(u).unwrap();
-            assert!((dir.length() - 1.0).abs() < 1e-9 && (sky.pdf(dir) / pdf - 1.0).abs() < 1e-2 || k % 97 != 0);
-            by_light += sky.radiance(dir) / pdf / f64::from(n);
+            let (dir, radiance, pdf) = sky.sample(u).unwrap();
+            assert!((dir.length() - 1.0).abs() < 1e-9 && (sky.seen(dir).1 / pdf - 1.0).abs() < 1e-2 || k % 97 != 0);
+            by_light += radiance / pdf / f64::from(n);
             area += 1.0 / pdf / f64::from(n);
             let z = 1.0 - 2.0 * u[0];
             let s = (1.0 - z * z).sqrt();
             let any = DVec3::new(s * (TAU * u[1]).cos(), z, s * (TAU * u[1]).sin());
-            uniform += sky.radiance(any) * 4.0 * PI / f64::from(n);
+            uniform += sky.seen(any).0 * 4.0 * PI / f64::from(n);
         }
         assert!((area / (4.0 * PI) - 1.0).abs() < 0.01, "densities integrate to one: {area}");
         assert!(((by_light - uniform) / uniform).abs().max_element() < 0.01, "{by_light} {uniform}");
+    }
+
+    #[test]
+    fn an_even_sky_is_what_its_picture_says() {
+        let uneven = environment();
+        let texels = Texels::Float(vec![[0.5, 0.6, 0.7, 1.0]; 32]);
+        let texture = Texture { name: String::new(), width: 8, height: 4, texels };
+        let environment = Environment { texture: texture.into(), ..uneven };
+        let (sky, uneven) = (Sky::new(&environment), Sky::new(&uneven));
+        assert!(sky.even.is_some() && uneven.even.is_none());
+        assert!((sky.brightness() / (4.0 * PI * 1.2) - 1.0).abs() < 1e-6);
+        let by_cells = Sky { even: None, ..Sky::new(&environment) };
+        let random = PixelRandom::new(4, 5, 6);
+        for k in 0..1000 {
+            let u = random.spread(k, 0);
+            let ((dir, radiance, pdf), (other, other_radiance, other_pdf)) =
+                (sky.sample(u).unwrap(), by_cells.sample(u).unwrap());
+            assert!((dir - other).length() < 1e-5, "{k}: {dir} {other}");
+            assert!((radiance - other_radiance).length() < 1e-6 && (pdf / other_pdf - 1.0).abs() < 1e-5, "{k}");
+            assert_eq!(sky.seen(dir), (radiance, pdf));
+        }
     }
 }

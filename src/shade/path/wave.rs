@@ -1,10 +1,10 @@
 //! The rays of one bounce of many paths, with what they carry, and the shadow rays that go with them.
 
-use super::points::{BASE, FIELDS, Fields, PARAM, RAW_DIR, RAW_PLACE, RAW_TRIANGLE, SQUEEZE, THROUGHPUT};
+use glam::DVec3;
+
 use crate::lanes::chosen::{Chosen, at, spill};
-use crate::lanes::{Lanes, Lanes3, Real};
-use crate::ray::{Hits, Rays};
-use crate::shade::look::Look;
+use crate::lanes::{Lanes, Lanes3, Real, each};
+use crate::ray::{PAD, Rays};
 
 /// Rays and what their paths carry, in parallel.
 #[derive(Clone, Debug)]
@@ -14,7 +14,7 @@ pub struct Wave<S> {
     /// Path of each.
     pub path: Vec<u32>,
     /// What of the radiance along the ray reaches the eye.
-    pub throughput: Vec<[S; 3]>,
+    pub throughput: [Vec<S>; 3],
     /// Density with which the direction was found, per solid angle; infinite if no light could be aimed at.
     pub pdf: Vec<S>,
     /// Product of the squared relative indices of refraction that the throughput was divided by.
@@ -23,7 +23,8 @@ pub struct Wave<S> {
 
 impl<S: Real> Default for Wave<S> {
     fn default() -> Self {
-        Self { rays: Rays::new(0), path: Vec::new(), throughput: Vec::new(), pdf: Vec::new(), squeeze: Vec::new() }
+        let (path, column) = (Vec::new(), || Vec::new());
+        Self { rays: Rays::new(0), path, throughput: [column(), column(), column()], pdf: column(), squeeze: column() }
     }
 }
 
@@ -32,18 +33,21 @@ impl<S: Real> Wave<S> {
     pub fn open(&mut self, count: usize) {
         self.rays.reset(count);
         self.path.clear();
-        self.throughput.clear();
-        self.pdf.clear();
-        self.squeeze.clear();
+        self.columns().into_iter().for_each(|column| column.resize(count.next_multiple_of(PAD), S::ZERO));
     }
 
-    /// Adds a ray with an open end.
-    pub fn push(&mut self, path: u32, org: [S; 3], dir: [S; 3], throughput: [S; 3], pdf: S, squeeze: S) {
-        self.rays.set(self.path.len(), org, dir, S::ZERO, S::INFINITY);
+    fn columns(&mut self) -> [&mut Vec<S>; 5] {
+        let [r, g, b] = &mut self.throughput;
+        [r, g, b, &mut self.pdf, &mut self.squeeze]
+    }
+
+    /// Adds a ray of the camera.
+    pub fn start(&mut self, path: u32, org: [S; 3], dir: [S; 3]) {
+        let i = self.path.len();
+        self.rays.set(i, org, dir, S::ZERO, S::INFINITY);
         self.path.push(path);
-        self.throughput.push(throughput);
-        self.pdf.push(pdf);
-        self.squeeze.push(squeeze);
+        let numbers = [S::ONE, S::ONE, S::ONE, S::INFINITY, S::ONE];
+        self.columns().into_iter().zip(numbers).for_each(|(column, x)| column[i] = x);
     }
 
     /// Adds rays with open ends: the lanes `chosen` of origins, directions and throughputs, densities and squeezes.
@@ -58,11 +62,9 @@ impl<S: Real> Wave<S> {
         let first = self.path.len();
         self.path.extend(chosen.iter().map(|lane| path[lane]));
         self.rays.put(first, chosen, [org, dir], S::Wide::splat(S::INFINITY));
-        extend(&mut self.throughput, chosen, throughput);
-        for (list, values) in [(&mut self.pdf, pdf), (&mut self.squeeze, squeeze)] {
-            list.resize(first + chosen.count(), S::ZERO);
-            chosen.pack(values, &mut list[first..]);
-        }
+        let [r, g, b] = throughput;
+        let numbers = [r, g, b, pdf, squeeze];
+        self.columns().into_iter().zip(numbers).for_each(|(column, x)| chosen.pack(x, &mut column[first..]));
     }
 
     /// Ends the additions.
@@ -70,20 +72,23 @@ impl<S: Real> Wave<S> {
         self.rays.truncate(self.path.len());
     }
 
-    /// The fields of the point on a bare triangle that ray `i` met; the rest is computed in packets.
+    /// Origin and direction of ray `i`.
     #[inline]
-    pub fn raw_fields(&self, i: usize, hits: &Hits<S>, triangle: &[S; 9], look: &Look) -> Fields<S> {
-        let mut fields = [S::ZERO; FIELDS];
-        fields[RAW_TRIANGLE..RAW_TRIANGLE + 9].copy_from_slice(triangle);
-        fields[RAW_DIR..RAW_DIR + 3].copy_from_slice(&self.rays.dir(i));
-        (0..3).for_each(|axis| fields[BASE + axis] = S::from_f64(look.base[axis]));
-        (0..4).for_each(|k| fields[PARAM + k] = S::from_f64(look.param[k]));
-        fields[RAW_PLACE] = hits.u[i];
-        fields[RAW_PLACE + 1] = hits.v[i];
-        fields[RAW_PLACE + 2] = hits.t[i];
-        fields[THROUGHPUT..THROUGHPUT + 3].copy_from_slice(&self.throughput[i]);
-        fields[SQUEEZE] = self.squeeze[i];
-        fields
+    pub fn line(&self, i: usize) -> (DVec3, DVec3) {
+        (DVec3::from(self.rays.org(i).map(S::to_f64)), DVec3::from(self.rays.dir(i).map(S::to_f64)))
+    }
+
+    /// What of the radiance along ray `i` reaches the eye.
+    #[inline]
+    pub fn throughput(&self, i: usize) -> DVec3 {
+        DVec3::from(each(|axis| self.throughput[axis][i].to_f64()))
+    }
+
+    /// Weight of what ray `i` found by itself, by the power heuristic, against aiming at it with density `light`.
+    #[inline]
+    pub fn weight(&self, i: usize, light: f64) -> f64 {
+        let odds = light / self.pdf[i].to_f64();
+        1.0 / odds.mul_add(odds, 1.0)
     }
 }
 

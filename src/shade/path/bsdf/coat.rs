@@ -16,7 +16,7 @@ use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, brightness, fresnel, mirrored, only, ratio};
 use crate::lanes::space::{add, choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
-use crate::shade::path::points::{BASE, PARAM, Points};
+use crate::shade::path::points::LookLanes;
 
 /// The base under its coat.
 struct Base<V> {
@@ -27,9 +27,9 @@ struct Base<V> {
 
 impl<V: Lanes> Base<V> {
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
-        let (one, base) = (V::constant(1.0), points.vector::<V>(BASE, first));
-        let (eta, inside): (V, V) = (points.scalar(PARAM, first), points.scalar(PARAM + 1, first));
+    fn load(look: &LookLanes<V>) -> Self {
+        let (one, base) = (V::constant(1.0), look.base);
+        let (eta, inside): (V, V) = (look.param[0], look.param[1]);
         Self { color: base.map(|c| c / ((one - c * inside) * eta * eta)), eta }
     }
 
@@ -58,8 +58,8 @@ impl<V: Lanes> Bsdf<'_, V> for SmoothCoat<V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
-        Self(Base::load(points, first))
+    fn load(look: &LookLanes<V>, _: &FacetsList) -> Self {
+        Self(Base::load(look))
     }
 
     #[inline(always)]
@@ -111,16 +111,16 @@ impl<'t, V: Lanes> Bsdf<'t, V> for RoughCoat<'t, V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize, facets: &'t FacetsList) -> Self {
+    fn load(look: &LookLanes<V>, facets: &'t FacetsList) -> Self {
         let one = V::constant(1.0);
-        let facets = PacketFacets::<V>::load(facets, points.scalar(PARAM + 3, first));
+        let facets = PacketFacets::<V>::load(facets, look.param[3]);
         let inside = facets.chance;
-        let share = points.vector::<V>(BASE, first).map(|c| c * (one - inside) / (one - c * inside));
+        let share = look.base.map(|c| c * (one - inside) / (one - c * inside));
         Self {
             color: share.map(|c| c * facets.down),
             share: brightness(share),
-            eta: points.scalar(PARAM, first),
-            ggx: Ggx::new(points.scalar(PARAM + 2, first)),
+            eta: look.param[0],
+            ggx: Ggx::new(look.param[2]),
             facets,
         }
     }

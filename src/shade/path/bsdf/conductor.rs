@@ -9,7 +9,7 @@ use super::warp::{grazing, grazing_pdf};
 use super::{Bsdf, Sampled, Value, fresnel, mirrored, none, only, ratio};
 use crate::lanes::space::{add, choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
-use crate::shade::path::points::{PARAM, Points};
+use crate::shade::path::points::LookLanes;
 
 /// A packet of complex indices of refraction.
 struct Metal<V> {
@@ -19,8 +19,8 @@ struct Metal<V> {
 
 impl<V: Lanes> Metal<V> {
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize) -> Self {
-        Self { eta: points.vector(PARAM, first), k: points.vector(PARAM + 3, first) }
+    fn load(look: &LookLanes<V>) -> Self {
+        Self { eta: look.three(0), k: look.three(3) }
     }
 
     #[inline(always)]
@@ -36,8 +36,8 @@ impl<V: Lanes> Bsdf<'_, V> for SmoothConductor<V> {
     const SMOOTH: bool = true;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
-        Self(Metal::load(points, first))
+    fn load(look: &LookLanes<V>, _: &FacetsList) -> Self {
+        Self(Metal::load(look))
     }
 
     #[inline(always)]
@@ -63,9 +63,9 @@ impl<'t, V: Lanes> Bsdf<'t, V> for RoughConductor<'t, V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize, facets: &'t FacetsList) -> Self {
-        let facets = PacketFacets::load(facets, points.scalar(PARAM + 6, first));
-        Self { metal: Metal::load(points, first), ggx: Ggx::new(facets.alpha), facets }
+    fn load(look: &LookLanes<V>, facets: &'t FacetsList) -> Self {
+        let facets = PacketFacets::load(facets, look.param[6]);
+        Self { metal: Metal::load(look), ggx: Ggx::new(facets.alpha), facets }
     }
 
     #[inline(always)]

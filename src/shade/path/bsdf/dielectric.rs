@@ -9,7 +9,7 @@ use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, conductor::reflected, fresnel, mirrored, none, ratio};
 use crate::lanes::space::{choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
-use crate::shade::path::points::{BASE, PARAM, Points};
+use crate::shade::path::points::LookLanes;
 
 /// A smooth boundary.
 pub struct SmoothDielectric<V> {
@@ -22,8 +22,8 @@ impl<V: Lanes> Bsdf<'_, V> for SmoothDielectric<V> {
     const SMOOTH: bool = true;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
-        Self { tint: points.vector(BASE, first), eta: points.scalar(PARAM, first) }
+    fn load(look: &LookLanes<V>, _: &FacetsList) -> Self {
+        Self { tint: look.base, eta: look.param[0] }
     }
 
     #[inline(always)]
@@ -119,14 +119,9 @@ impl<'t, V: Lanes> Bsdf<'t, V> for RoughDielectric<'t, V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize, facets: &'t FacetsList) -> Self {
-        let facets = PacketFacets::load(facets, points.scalar(PARAM + 2, first));
-        Self {
-            tint: points.vector(BASE, first),
-            eta: points.scalar(PARAM, first),
-            ggx: Ggx::new(points.scalar(PARAM + 1, first)),
-            facets,
-        }
+    fn load(look: &LookLanes<V>, facets: &'t FacetsList) -> Self {
+        let facets = PacketFacets::load(facets, look.param[2]);
+        Self { tint: look.base, eta: look.param[0], ggx: Ggx::new(look.param[1]), facets }
     }
 
     #[inline(always)]

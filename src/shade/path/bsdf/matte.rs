@@ -7,7 +7,7 @@ use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, brightness, mirrored, only, ratio};
 use crate::lanes::space::choose;
 use crate::lanes::{Lanes, Lanes3};
-use crate::shade::path::points::{BASE, PARAM, Points};
+use crate::shade::path::points::LookLanes;
 
 /// A packet of them.
 pub struct Matte<V> {
@@ -21,8 +21,8 @@ impl<V: Lanes> Bsdf<'_, V> for Matte<V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
-        let (diffuse, mirror) = (points.vector(BASE, first), points.vector(PARAM, first));
+    fn load(look: &LookLanes<V>, _: &FacetsList) -> Self {
+        let (diffuse, mirror) = (look.base, look.three(0));
         let d = brightness::<V>(diffuse);
         Self { diffuse, mirror, chance: ratio(d, d + brightness(mirror)) }
     }

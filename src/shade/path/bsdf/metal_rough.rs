@@ -16,7 +16,7 @@ use super::warp::{cosine, grazing, grazing_pdf};
 use super::{Bsdf, Sampled, Value, brightness, fresnel, only, ratio};
 use crate::lanes::space::{add, choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
-use crate::shade::path::points::{BASE, PARAM, Points};
+use crate::shade::path::points::LookLanes;
 
 /// A packet of them.
 pub struct MetalRough<V> {
@@ -122,10 +122,10 @@ impl<V: Lanes> Bsdf<'_, V> for MetalRough<V> {
     const SMOOTH: bool = false;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
+    fn load(look: &LookLanes<V>, _: &FacetsList) -> Self {
         let one = V::constant(1.0);
-        let base = points.vector::<V>(BASE, first);
-        let [metallic, alpha, f0, transmission] = [0, 1, 2, 3].map(|i| points.scalar::<V>(PARAM + i, first));
+        let base = look.base;
+        let [metallic, alpha, f0, transmission] = [0, 1, 2, 3].map(|i| look.param[i]);
         let body = one - metallic;
         let rows = PacketRows::new(alpha);
         // The mean of (1 - cos)^5 over the hemisphere, weighted by the cosine, is 1 / 21.

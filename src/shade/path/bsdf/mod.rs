@@ -18,7 +18,7 @@ mod thin;
 mod warp;
 
 use self::facets::FacetsList;
-use super::points::Points;
+use super::points::LookLanes;
 use crate::lanes::{Lanes, Lanes3};
 
 pub(super) use coat::{RoughCoat, SmoothCoat};
@@ -54,8 +54,8 @@ pub(super) struct Sampled<V> {
 pub(super) trait Bsdf<'t, V: Lanes>: Sized {
     /// Whether all directions it samples are of perfect mirrors and the like: no light can be aimed at.
     const SMOOTH: bool;
-    /// The parameters of points `first..first + N`, whose tables of rough surfaces are in `facets`.
-    fn load(points: &Points<V::Scalar>, first: usize, facets: &'t FacetsList) -> Self;
+    /// The model of points that look like `look`, whose tables of rough surfaces are in `facets`.
+    fn load(look: &LookLanes<V>, facets: &'t FacetsList) -> Self;
     /// Light from `wi`, without perfect mirrors and the like.
     fn eval(&self, wo: Lanes3<V>, wi: Lanes3<V>) -> Value<V>;
     /// A direction from three numbers in [0, 1): two for the place, one for the choice of a lobe.

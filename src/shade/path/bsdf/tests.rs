@@ -13,26 +13,14 @@ use super::{
 };
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
-use crate::shade::path::points::{BASE, FIELDS, PARAM, Points};
+use crate::shade::path::points::{LookLanes, look_numbers};
 
 /// Base colour and parameters of one point.
 type Params = ([f64; 3], [f64; 7]);
 
-/// The same point in all lanes.
-fn everywhere<S: Real>(params: &Params) -> Points<S> {
-    packet(&[*params; MAX_LANES])
-}
-
-fn packet<S: Real>(list: &[Params]) -> Points<S> {
-    let mut points = Points::default();
-    for (base, param) in list {
-        let mut fields = [S::ZERO; FIELDS];
-        (0..3).for_each(|i| fields[BASE + i] = S::from_f64(base[i]));
-        (0..7).for_each(|i| fields[PARAM + i] = S::from_f64(param[i]));
-        points.push(0, &fields, false);
-    }
-    points.settle();
-    points
+/// The same look in all lanes.
+fn everywhere<V: Lanes>((base, param): &Params) -> LookLanes<V> {
+    LookLanes::of([&[look_numbers((*base).into(), param)], &[]], &[0; MAX_LANES][..V::N])
 }
 
 const COPPER: [f64; 6] = [0.21, 0.93, 1.1, 3.6, 2.6, 2.3];
@@ -108,7 +96,7 @@ impl Moments {
 /// Checks that the density of `eval` has the moments of the directions that `sample` finds, and that what the weights
 /// add up to is the integral of the value.
 fn density_is_of_samples<B: Bsdf<'static, f64>>(name: &str, params: &Params) {
-    let bsdf = B::load(&everywhere(params), 0, &FACETS);
+    let bsdf = B::load(&everywhere(params), &FACETS);
     for wo in [unit(0.9, 0.4), unit(0.35, 2.0)] {
         const SAMPLES: u32 = 1 << 17;
         const STEPS: u32 = 1200;
@@ -147,7 +135,7 @@ fn density_is_of_samples<B: Bsdf<'static, f64>>(name: &str, params: &Params) {
 
 /// Checks that the value and density of a sampled direction are those that `eval` gives, and the weight their ratio.
 fn weights_are_ratios<B: Bsdf<'static, f64>>(name: &str, params: &Params) {
-    let bsdf = B::load(&everywhere(params), 0, &FACETS);
+    let bsdf = B::load(&everywhere(params), &FACETS);
     let points = PixelPoints::new(5, 6, 7);
     let mut checked = 0;
     for i in 0..4000 {
@@ -172,7 +160,7 @@ fn weights_are_ratios<B: Bsdf<'static, f64>>(name: &str, params: &Params) {
 
 /// Checks f(a, b) = f(b, a) for directions on one side.
 fn reflection_is_reciprocal<B: Bsdf<'static, f64>>(name: &str, params: &Params) {
-    let bsdf = B::load(&everywhere(params), 0, &FACETS);
+    let bsdf = B::load(&everywhere(params), &FACETS);
     let points = PixelPoints::new(8, 9, 1);
     for i in 0..2000 {
         let ([a, b], [c, d]) = (points.point(i, 0), points.point(i, 1));
@@ -244,7 +232,7 @@ fn rough_glass_is_consistent() {
 fn refraction_is_reciprocal_but_for_the_squeeze() {
     let points = PixelPoints::new(3, 1, 4);
     let load =
-        |eta: f64, alpha: f64| RoughDielectric::<f64>::load(&everywhere(&([1.0; 3], glass(alpha, eta))), 0, &FACETS);
+        |eta: f64, alpha: f64| RoughDielectric::<f64>::load(&everywhere(&([1.0; 3], glass(alpha, eta))), &FACETS);
     let mut lit = 0;
     for (eta, alpha) in [(1.5, 0.3), (1.5, 0.9), (0.7, 0.5)] {
         let (front, back) = (load(eta, alpha), load(if eta == 1.5 { INDICES[0] } else { INDICES[3] }, alpha));
@@ -267,9 +255,9 @@ fn refraction_is_reciprocal_but_for_the_squeeze() {
 fn smooth_models_follow_the_laws() {
     let wo = unit(0.6, 1.0);
     let (tint, eta) = ([0.9, 0.8, 0.7], 1.5);
-    let glass = SmoothDielectric::<f64>::load(&everywhere(&(tint, [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), 0, &FACETS);
-    let pane = Thin::<f64>::load(&everywhere(&(tint, [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), 0, &FACETS);
-    let metal = SmoothConductor::<f64>::load(&everywhere(&([0.0; 3], copper(0.15))), 0, &FACETS);
+    let glass = SmoothDielectric::<f64>::load(&everywhere(&(tint, [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), &FACETS);
+    let pane = Thin::<f64>::load(&everywhere(&(tint, [eta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])), &FACETS);
+    let metal = SmoothConductor::<f64>::load(&everywhere(&([0.0; 3], copper(0.15))), &FACETS);
     let (reflected, through) = (glass.sample(wo, [0.3; 2], 0.0), glass.sample(wo, [0.3; 2], 0.9999));
     assert_eq!((reflected.wi, reflected.weight), ([-wo[0], -wo[1], wo[2]], [1.0; 3]));
     // Snell: sines in the ratio of the indices, in one plane.
@@ -296,13 +284,13 @@ fn smooth_models_follow_the_laws() {
 
 /// Lane `i` of a packet gives the bits that the same numbers give alone.
 fn lanes_are_alone<S: Real, W: Bsdf<'static, S::Wide>, B: Bsdf<'static, S>>(name: &str, list: &[Params]) {
-    let points = packet::<S>(list);
-    let numbers = PixelPoints::new(2, 7, 1);
+    let table: Vec<_> = list.iter().map(|(base, param)| look_numbers((*base).into(), param)).collect();
+    let chances = PixelPoints::new(2, 7, 1);
     let same = |a: S, b: S| a == b || (a.to_f64().is_nan() && b.to_f64().is_nan());
     for round in 0..200 {
-        let number = |lane: usize, pair: u32| numbers.point(round * 16 + lane as u32, pair).map(S::from_f64);
+        let number = |lane: usize, pair: u32| chances.point(round * 16 + lane as u32, pair).map(S::from_f64);
         let direction = |lane: usize, pair: u32, low: f64| {
-            let [a, b] = numbers.point(round * 16 + lane as u32, pair);
+            let [a, b] = chances.point(round * 16 + lane as u32, pair);
             unit(low + (1.0 - low) * a, b * TAU).map(S::from_f64)
         };
         let width = <S::Wide as Lanes>::N;
@@ -312,12 +300,13 @@ fn lanes_are_alone<S: Real, W: Bsdf<'static, S::Wide>, B: Bsdf<'static, S>>(name
         };
         let vector = |f: &dyn Fn(usize) -> [S; 3]| -> Lanes3<S::Wide> { [0, 1, 2].map(|c| load(&|lane| f(lane)[c])) };
         let (wo, wi) = (|lane| direction(lane, 0, 1e-3), |lane| direction(lane, 1, -1.0));
-        let wide = W::load(&points, 0, &FACETS);
+        let all: [u32; MAX_LANES] = std::array::from_fn(|lane| lane as u32);
+        let wide = W::load(&LookLanes::of([&table[..3], &table[3..]], &all[..width]), &FACETS);
         let place = [load(&|lane| number(lane, 2)[0]), load(&|lane| number(lane, 2)[1])];
         let value = wide.eval(vector(&wo), vector(&wi));
         let sampled = wide.sample(vector(&wo), place, load(&|lane| number(lane, 3)[0]));
         for lane in 0..width {
-            let narrow = B::load(&points, lane, &FACETS);
+            let narrow = B::load(&LookLanes::of([&table[..3], &table[3..]], &all[lane..=lane]), &FACETS);
             let (v, s) =
                 (narrow.eval(wo(lane), wi(lane)), narrow.sample(wo(lane), number(lane, 2), number(lane, 3)[0]));
             let all = (0..3).all(|c| {

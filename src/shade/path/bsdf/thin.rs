@@ -5,7 +5,7 @@ use super::matte::infinity;
 use super::{Bsdf, Sampled, Value, fresnel, mirrored, none};
 use crate::lanes::space::choose;
 use crate::lanes::{Lanes, Lanes3};
-use crate::shade::path::points::{BASE, PARAM, Points};
+use crate::shade::path::points::LookLanes;
 
 /// A packet of them.
 pub struct Thin<V> {
@@ -17,8 +17,8 @@ impl<V: Lanes> Bsdf<'_, V> for Thin<V> {
     const SMOOTH: bool = true;
 
     #[inline(always)]
-    fn load(points: &Points<V::Scalar>, first: usize, _: &FacetsList) -> Self {
-        Self { tint: points.vector(BASE, first), ior: points.scalar(PARAM, first) }
+    fn load(look: &LookLanes<V>, _: &FacetsList) -> Self {
+        Self { tint: look.base, ior: look.param[0] }
     }
 
     #[inline(always)]
