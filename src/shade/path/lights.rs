@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::alias::Alias;
-use super::emitter::{Aim, Emitter, Flat};
+use super::emitter::{Aim, Emitter, Form};
 use super::sky::Sky;
 use crate::lanes::Real;
 use crate::scene::assembly::{Part, PartKind};
@@ -19,8 +19,8 @@ type Run = (u32, u32, u32);
 /// Everything that shines.
 pub struct Lights<'a, S> {
     emitters: Vec<Emitter>,
-    /// Parallel to the emitters: what packets need of those that are even triangles.
-    flats: Vec<Option<Flat<S>>>,
+    /// Parallel to the list, the sky last: what packets need of them.
+    forms: Vec<Form<S>>,
     alias: Alias,
     /// Per placement: the number of its first emitting primitive in the list; `u32::MAX` if it has none.
     first: Vec<u32>,
@@ -49,10 +49,12 @@ impl<'a, S: Real> Lights<'a, S> {
         let mut weights: Vec<f64> = emitters.iter().map(|e| e.power(radius, looks)).collect();
         weights.extend(sky.as_ref().map(|sky| sky.brightness() * PI * radius * radius));
         share(&mut weights, |i| emitters.get(i).is_none_or(Emitter::is_far));
-        let flats = emitters.iter().map(|e| e.flat(looks)).collect();
+        let of_sky =
+            sky.as_ref().and_then(Sky::even).map_or(Form::Other, |light| Form::Sky(light.to_array().map(S::from_f64)));
+        let forms = emitters.iter().map(|e| e.form(looks)).chain([of_sky]).collect();
         Self {
             emitters,
-            flats,
+            forms,
             alias: Alias::new(&weights),
             first,
             runs,
@@ -70,10 +72,10 @@ impl<'a, S: Real> Lights<'a, S> {
         Some((index, self.alias.chance(index)))
     }
 
-    /// Light `index`, if it is a triangle that shines evenly.
-    #[inline]
-    pub fn flat(&self, index: usize) -> Option<&Flat<S>> {
-        self.flats.get(index)?.as_ref()
+    /// What packets need of light `index`.
+    #[inline(always)]
+    pub fn form(&self, index: usize) -> &Form<S> {
+        &self.forms[index]
     }
 
     /// Whether nothing can be aimed at.
@@ -116,6 +118,17 @@ impl<'a, S: Real> Lights<'a, S> {
         }
         let index = (first + before + prim - start) as usize;
         self.alias.chance(index) * self.emitters[index].pdf(from, to, ng)
+    }
+
+    /// Radiance of all rays that leave the scene, and the density per solid angle with which [`Self::aim`] finds it, where
+    /// they are the same for all directions.
+    pub fn even(&self) -> Option<(DVec3, f64)> {
+        if !self.suns.is_empty() {
+            return None;
+        }
+        let Some(sky) = &self.sky else { return Some((self.background, 0.0)) };
+        let radiance = sky.even()?;
+        Some((radiance, self.alias.chance(self.sky_index) * sky.seen(DVec3::Y).1))
     }
 
     /// Radiance of a ray that leaves the scene in direction `dir` (need not be unit): each source of it times `weight` of the

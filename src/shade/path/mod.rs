@@ -18,6 +18,7 @@ mod lights;
 mod points;
 mod scatter;
 mod sky;
+mod target;
 pub(super) mod wave;
 
 use std::sync::Arc;
@@ -44,8 +45,8 @@ use super::shader::{Settings, Workspace};
 use super::stats::BounceStats;
 use super::through::{Again, MIXTURE, Through, number};
 use crate::camera::sobol::PixelPoints;
-use crate::lanes::chosen::lanes_of;
-use crate::lanes::{Lanes, Real};
+use crate::lanes::chosen::{Chosen, at, lanes_of, spill};
+use crate::lanes::{Lanes, MAX_LANES, Real, each};
 use crate::ray::{Hits, Rays};
 use crate::scene::description::{Description, Material};
 use crate::scene::material::Scattering;
@@ -183,8 +184,8 @@ impl<'a, S: Real> Paths<'a, S> {
         let shadows = &memory.shadows;
         let (hits, occluded, scratch) = (&mut work.hits, &mut work.occluded, &mut work.scratch);
         let left = through.shadows(&shadows.rays, hits, occluded, scratch, &mut memory.again, false, None);
-        for ((&path, light), &left) in shadows.path.iter().zip(&shadows.light).zip(left) {
-            let light = DVec3::from(light.map(S::to_f64)) * left;
+        for (i, (&path, &left)) in shadows.path.iter().zip(left).enumerate() {
+            let light = DVec3::from(each(|axis| shadows.light[axis][i].to_f64())) * left;
             let seen = &mut out[path as usize];
             seen.radiance += light;
             if bounce == 0 {
@@ -239,10 +240,10 @@ impl<'a, S: Real> Paths<'a, S> {
         let count = memory.now.path.len();
         for first in (0..count).step_by(S::Wide::N) {
             let hit = met_lanes(hits, first);
-            for i in first..count.min(first + S::Wide::N) {
-                if hit >> (i - first) & 1 == 0 {
-                    self.leave(i, bounce, &memory.now, out);
-                }
+            let there = S::Wide::N.min(count - first);
+            let gone = !hit & (u32::MAX >> (32 - there));
+            if gone != 0 {
+                self.leave(first, gone, bounce, &memory.now, out);
             }
             if hit == 0 {
                 continue;
@@ -276,14 +277,30 @@ impl<'a, S: Real> Paths<'a, S> {
         }
     }
 
-    /// Ray `i` of the wave has left the scene.
-    fn leave(&self, i: usize, bounce: u32, wave: &Wave<S>, out: &mut [Sample]) {
-        let light = self.lights.beyond(wave.line(i).1, |light| wave.weight(i, light));
-        let seen = &mut out[wave.path[i] as usize];
-        seen.shine(bounce, wave.throughput(i) * light);
-        if bounce == 0 && light != DVec3::ZERO {
-            seen.alpha = 1.0;
+    /// The `lanes` of rays `first..first + N` of the wave have left the scene.
+    fn leave(&self, first: usize, lanes: u32, bounce: u32, wave: &Wave<S>, out: &mut [Sample]) {
+        let mut shine = |i: usize, light: DVec3| {
+            let seen = &mut out[wave.path[i] as usize];
+            seen.shine(bounce, light);
+            if bounce == 0 && light != DVec3::ZERO {
+                seen.alpha = 1.0;
+            }
+        };
+        let Some((radiance, pdf)) = self.lights.even() else {
+            for i in lanes_of(lanes).map(|lane| first + lane) {
+                let light = self.lights.beyond(wave.line(i).1, |light| wave.weight(i, light));
+                shine(i, wave.throughput(i) * light);
+            }
+            return;
+        };
+        if radiance == DVec3::ZERO {
+            return;
         }
+        let odds = S::Wide::constant(pdf) / S::Wide::load(&wave.pdf[first..]);
+        let weight = S::Wide::constant(1.0) / odds.mul_add(odds, S::Wide::constant(1.0));
+        let light = each(|c| S::Wide::load(&wave.throughput[c][first..]) * S::Wide::constant(radiance[c]) * weight);
+        let light = spill(light);
+        lanes_of(lanes).for_each(|lane| shine(first + lane, DVec3::from(at(&light, lane).map(S::to_f64))));
     }
 
     /// Ray `i` of the wave has arrived where lanes do not know what there is.
@@ -386,10 +403,12 @@ impl<S: Real> PathMemory<S> {
     /// The primary rays as the first wave.
     fn start(&mut self, rays: &Rays<S>) {
         self.now.open(rays.len());
+        let (one, certain) = (S::Wide::constant(1.0), S::Wide::splat(S::INFINITY));
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
-            for i in lanes_of(rays.live_lanes(first)).map(|lane| first + lane) {
-                self.now.start(i as u32, rays.org(i), rays.dir(i));
-            }
+            let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
+            let path: [u32; MAX_LANES] = std::array::from_fn(|lane| (first + lane) as u32);
+            let chosen = Chosen::of(rays.live_lanes(first));
+            self.now.push_some(&chosen, &path, [vector(&rays.org), vector(&rays.dir), [one; 3]], [certain, one]);
         }
         self.now.close();
     }

@@ -1,15 +1,12 @@
 //! One bounce of the points of one model, packet by packet: a light is aimed at, a direction is chosen.
 
-use glam::DVec3;
-
 use super::Paths;
 use super::bsdf::Bsdf;
-use super::emitter::FLAT;
 use super::points::{LookLanes, LookNumbers, PlaceLanes, Places, Points};
 use super::wave::{Shadows, Wave};
 use crate::camera::sobol::{PixelPoints, fraction};
-use crate::lanes::chosen::{Chosen, Picked, at, columns, spill};
-use crate::lanes::space::{Frame, choose, normalize, scale, sub};
+use crate::lanes::chosen::{Chosen, Picked};
+use crate::lanes::space::{Frame, choose, normalize};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, map3};
 
 /// Bounces before paths may end by chance.
@@ -22,7 +19,7 @@ const PAIRS: u32 = 4;
 const CAMERA_PAIRS: u32 = 1;
 
 /// A column of lanes in memory.
-type Column<S> = [S; MAX_LANES];
+pub type Column<S> = [S; MAX_LANES];
 
 /// The random numbers of a packet: place and choice of the direction, place and choice of the light, roulette.
 struct Numbers<S> {
@@ -163,7 +160,8 @@ impl<S: Real> Paths<'_, S> {
         numbers: &Numbers<S>,
         shadows: &mut Shadows<S>,
     ) {
-        let target = self.targets(packet, path, numbers);
+        let chosen = [numbers.light[0], numbers.light[1], numbers.light_choice];
+        let target = self.targets(packet.place.position, path.len(), &chosen);
         let one = S::Wide::constant(1.0);
         let local = packet.frame.to_local(target.dir);
         let (org, is_consistent) = packet.leave(target.dir, local);
@@ -180,112 +178,6 @@ impl<S: Real> Paths<'_, S> {
         let far = target.near.cmp_lt(one);
         let t_max = S::Wide::select(far, S::Wide::splat(S::INFINITY), S::Wide::splat(self.shadow_end));
         shadows.push(&those(wanted, path), path, [org, dir, light], t_max);
-    }
-
-    /// Something that shines for each point of the packet, by chance.
-    #[inline(always)]
-    fn targets(&self, packet: &Packet<S::Wide>, path: &[u32], numbers: &Numbers<S>) -> Targets<S::Wide> {
-        let zero = [S::ZERO; MAX_LANES];
-        let (mut dir, mut radiance, mut target) = ([zero; 3], [zero; 3], [zero; 3]);
-        // Without light the density is 1 and the radiance 0.
-        let (mut pdf, mut near, mut points) = ([S::ONE; MAX_LANES], zero, 0);
-        let (mut lamps, mut even) = ([0; MAX_LANES], 0);
-        let position = spill(packet.place.position);
-        for lane in 0..path.len() {
-            let Some((index, chance)) = self.lights.choose(numbers.light_choice[lane].to_f64()) else { continue };
-            if self.lights.flat(index).is_some() {
-                lamps[lane] = index;
-                pdf[lane] = S::from_f64(chance);
-                even |= 1u32 << lane;
-                continue;
-            }
-            let from = DVec3::from(at(&position, lane).map(S::to_f64));
-            let place = [numbers.light[0][lane].to_f64(), numbers.light[1][lane].to_f64()];
-            let Some(aim) = self.lights.aim(from, (index, chance), place, self.world, &self.looks) else { continue };
-            for axis in 0..3 {
-                dir[axis][lane] = S::from_f64(aim.dir[axis]);
-                radiance[axis][lane] = S::from_f64(aim.radiance[axis]);
-                target[axis][lane] = S::from_f64(aim.target[axis]);
-            }
-            pdf[lane] = S::from_f64(aim.pdf);
-            near[lane] = if aim.is_far { S::ZERO } else { S::ONE };
-            points |= u32::from(aim.is_point) << lane;
-        }
-        let load = |columns: &[Column<S>; 3]| [0, 1, 2].map(|i| S::Wide::load(&columns[i]));
-        let others = Targets {
-            place: load(&target),
-            near: S::Wide::load(&near),
-            dir: load(&dir),
-            pdf: S::Wide::load(&pdf),
-            radiance: load(&radiance),
-            is_point: Mask::<S>::from_bits(points),
-        };
-        if even == 0 {
-            return others;
-        }
-        let light = [S::Wide::load(&numbers.light[0]), S::Wide::load(&numbers.light[1])];
-        let none = [S::ZERO; FLAT];
-        let columns = columns(even, |lane| self.lights.flat(lamps[lane]).unwrap_or(&none));
-        let mut flat = [S::Wide::constant(0.0); FLAT];
-        for (flat, column) in flat.iter_mut().zip(&columns) {
-            *flat = S::Wide::load(column);
-        }
-        on_triangles(packet.place.position, &flat, light, Mask::<S>::from_bits(even), &others)
-    }
-}
-
-/// Masks of packets.
-type Mask<S> = <<S as Real>::Wide as Lanes>::Mask;
-
-/// What a packet aims at.
-struct Targets<V: Lanes> {
-    /// The place, or far away the direction to it.
-    place: Lanes3<V>,
-    /// 1 for a place, 0 for a direction.
-    near: V,
-    /// Unit direction.
-    dir: Lanes3<V>,
-    /// Density per solid angle; of a point the chance of the light.
-    pdf: V,
-    /// Radiance from there; of a point irradiance.
-    radiance: Lanes3<V>,
-    /// Lights without extent.
-    is_point: V::Mask,
-}
-
-/// Uniform points of emitting triangles in the lanes `even`, whose chance is the density in `others`; `flat` are the
-/// numbers of [`super::emitter::Flat`].
-/// Source of the map: E. Heitz, *A Low-Distortion Map Between Triangle and Square*, 2019.
-#[inline(always)]
-fn on_triangles<V: Lanes>(
-    from: Lanes3<V>,
-    flat: &[V; FLAT],
-    [u, v]: [V; 2],
-    even: V::Mask,
-    others: &Targets<V>,
-) -> Targets<V> {
-    let (zero, one, half) = (V::constant(0.0), V::constant(1.0), V::constant(0.5));
-    let vector = |k: usize| [flat[3 * k], flat[3 * k + 1], flat[3 * k + 2]];
-    let upper = u.cmp_lt(v);
-    let b = V::select(upper, half * u, u - half * v);
-    let c = V::select(upper, v - half * u, half * v);
-    let (corner, e1, e2, normal) = (vector(0), vector(1), vector(2), vector(3));
-    let place: Lanes3<V> = [0, 1, 2].map(|i| c.mul_add(e2[i], b.mul_add(e1[i], corner[i])));
-    let away = sub(place, from);
-    let square = dot(away, away);
-    let dir = scale(away, one / square.sqrt());
-    let cosine = dot(dir, normal);
-    let radiance = choose(cosine.cmp_lt(zero), vector(4), vector(5));
-    let pdf = others.pdf * square / (cosine.abs() * flat[18]);
-    // Seen edge on, or from where it is, it gives nothing.
-    let seen = even & pdf.cmp_lt(V::splat(V::Scalar::INFINITY)) & zero.cmp_lt(pdf);
-    Targets {
-        place: choose(even, place, others.place),
-        near: V::select(even, one, others.near),
-        dir: choose(seen, dir, others.dir),
-        pdf: V::select(seen, pdf, others.pdf),
-        radiance: choose(seen, radiance, others.radiance),
-        is_point: others.is_point,
     }
 }
 

@@ -62,6 +62,11 @@ impl<'a> Sky<'a> {
         self.brightness
     }
 
+    /// The radiance from all directions, if it is the same.
+    pub fn even(&self) -> Option<DVec3> {
+        self.even
+    }
+
     /// Radiance from direction `dir` (where one looks; need not be unit) and the density of [`Self::sample`] there.
     pub fn seen(&self, dir: DVec3) -> (DVec3, f64) {
         if let Some(radiance) = self.even {

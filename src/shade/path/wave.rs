@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::lanes::chosen::{Chosen, at, spill};
+use crate::lanes::chosen::Chosen;
 use crate::lanes::{Lanes, Lanes3, Real, each};
 use crate::ray::{PAD, Rays};
 
@@ -39,15 +39,6 @@ impl<S: Real> Wave<S> {
     fn columns(&mut self) -> [&mut Vec<S>; 5] {
         let [r, g, b] = &mut self.throughput;
         [r, g, b, &mut self.pdf, &mut self.squeeze]
-    }
-
-    /// Adds a ray of the camera.
-    pub fn start(&mut self, path: u32, org: [S; 3], dir: [S; 3]) {
-        let i = self.path.len();
-        self.rays.set(i, org, dir, S::ZERO, S::INFINITY);
-        self.path.push(path);
-        let numbers = [S::ONE, S::ONE, S::ONE, S::INFINITY, S::ONE];
-        self.columns().into_iter().zip(numbers).for_each(|(column, x)| column[i] = x);
     }
 
     /// Adds rays with open ends: the lanes `chosen` of origins, directions and throughputs, densities and squeezes.
@@ -100,12 +91,12 @@ pub struct Shadows<S> {
     /// Path of each.
     pub path: Vec<u32>,
     /// What arrives at the eye.
-    pub light: Vec<[S; 3]>,
+    pub light: [Vec<S>; 3],
 }
 
 impl<S: Real> Default for Shadows<S> {
     fn default() -> Self {
-        Self { rays: Rays::new(0), path: Vec::new(), light: Vec::new() }
+        Self { rays: Rays::new(0), path: Vec::new(), light: [Vec::new(), Vec::new(), Vec::new()] }
     }
 }
 
@@ -114,7 +105,7 @@ impl<S: Real> Shadows<S> {
     pub fn open(&mut self, count: usize) {
         self.rays.reset(count);
         self.path.clear();
-        self.light.clear();
+        self.light.iter_mut().for_each(|column| column.resize(count.next_multiple_of(PAD), S::ZERO));
     }
 
     /// Adds rays: the lanes `chosen` of origins, directions, light and ends.
@@ -123,18 +114,11 @@ impl<S: Real> Shadows<S> {
         let first = self.path.len();
         self.path.extend(chosen.iter().map(|lane| path[lane]));
         self.rays.put(first, chosen, [org, dir], t_max);
-        extend(&mut self.light, chosen, light);
+        self.light.iter_mut().zip(light).for_each(|(column, x)| chosen.pack(x, &mut column[first..]));
     }
 
     /// Ends the additions.
     pub fn close(&mut self) {
         self.rays.truncate(self.path.len());
     }
-}
-
-/// Adds the lanes `chosen` of `vectors`.
-#[inline(always)]
-fn extend<S: Real>(list: &mut Vec<[S; 3]>, chosen: &Chosen, vectors: Lanes3<S::Wide>) {
-    let columns = spill(vectors);
-    list.extend(chosen.iter().map(|lane| at(&columns, lane)));
 }

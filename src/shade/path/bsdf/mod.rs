@@ -15,7 +15,7 @@ mod matte;
 mod metal_rough;
 mod rows;
 mod thin;
-mod warp;
+pub(super) mod warp;
 
 use self::facets::FacetsList;
 use super::points::LookLanes;
