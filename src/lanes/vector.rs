@@ -144,4 +144,4 @@ vector_lanes!(f32x8, f32, 8, u32x8, const { powers32() });
 vector_lanes!(f32x16, f32, 16, u32x16, const { powers32() }, super::words::packed);
 vector_lanes!(f64x2, f64, 2, u64x2, const { powers64() });
 vector_lanes!(f64x4, f64, 4, u64x4, const { powers64() });
-vector_lanes!(f64x8, f64, 8, u64x8, const { powers64() });
+vector_lanes!(f64x8, f64, 8, u64x8, const { powers64() }, super::words::packed_doubles);

@@ -120,7 +120,7 @@ impl Triangle {
             // A single ray tests the whole block at once and looks closer where it is not outside.
             let ray = packet.single(0);
             let turned = Turned::of(&ray, K);
-            wanted &= Self::candidates(&turned, ray.t_min, t_max.lane(0), block);
+            wanted &= Self::candidates(&turned, ray.t_min, t_max.lane(0), block).0;
         }
         while wanted != 0 {
             let i = wanted.trailing_zeros() as usize & (BLOCK - 1);
@@ -129,16 +129,16 @@ impl Triangle {
             let edges = Edges::new(around(packet.org, K), packet.shear, K, corners);
             let maybe = !edges.outside() & V::Mask::from_bits(lanes);
             if maybe.any() {
-                let candidate = Self::accept(packet, &block.get(i), maybe, &edges);
+                let candidate = Self::accept(packet, &block.get(i), maybe, edges.functions);
                 found(&candidate, lanes, block.prim[i]);
             }
         }
     }
 
     /// Triangles of a block to [`Triangle::look_closer`] at, as bits: those that the ray is not outside of and whose
-    /// corners are neither all beyond `t_max` nor all before `t_min`.
+    /// corners are neither all beyond `t_max` nor all before `t_min`; and the edge functions of all.
     #[inline(always)]
-    pub fn candidates<S: Real>(ray: &Turned<S>, t_min: S, t_max: S, block: &TriangleBlock<S>) -> u32 {
+    pub fn candidates<S: Real>(ray: &Turned<S>, t_min: S, t_max: S, block: &TriangleBlock<S>) -> (u32, [S::Octo; 3]) {
         let rcp = S::Octo::splat(ray.rcp);
         let corners = |f: usize| S::Octo::load(&block.fields[f]);
         let edges = Edges::new(ray.org.map(S::Octo::splat), ray.shear.map(S::Octo::splat), ray.axis, corners);
@@ -146,24 +146,24 @@ impl Triangle {
         let [a, b, c] = edges.depth.map(|z| z * rcp);
         let (near, far) = (a.fast_min(b).fast_min(c), a.fast_max(b).fast_max(c));
         let aside = S::Octo::splat(t_max).cmp_lt(near) | pad(far).cmp_lt(S::Octo::splat(t_min));
-        !(edges.outside() | aside).bits()
+        ((!(edges.outside() | aside)).bits(), edges.functions)
     }
 
-    /// One ray against one of its [`Triangle::candidates`].
+    /// One ray against one of its [`Triangle::candidates`], whose edge functions it has there.
     #[inline(always)]
-    pub fn look_closer<S: Real>(ray: &Packet<S>, turned: &Turned<S>, numbers: &[S; 9]) -> Candidate<S> {
-        Self::accept(ray, numbers, true, &Edges::new(turned.org, turned.shear, turned.axis, |f| numbers[f]))
+    pub fn look_closer<S: Real>(ray: &Packet<S>, numbers: &[S; 9], edges: [S; 3]) -> Candidate<S> {
+        Self::accept(ray, numbers, true, edges)
     }
 
     /// Depth, weights and segment of lanes that are not outside the triangle.
     #[inline(always)]
-    fn accept<V: Lanes>(packet: &Packet<V>, n: &[V::Scalar; 9], maybe: V::Mask, e: &Edges<V>) -> Candidate<V> {
-        let det = e.u + e.v + e.w;
+    fn accept<V: Lanes>(packet: &Packet<V>, n: &[V::Scalar; 9], maybe: V::Mask, [u, v, w]: [V; 3]) -> Candidate<V> {
+        let det = u + v + w;
         let inv = V::constant(1.0) / det;
         let plane = unit_normal(n).map(|x| V::splat(V::Scalar::from_f64(x)));
         let corner = [0, 1, 2].map(|a| V::splat(n[a]) - packet.org[a]);
         let t = dot(plane, corner) / dot(plane, packet.dir);
-        let mut found = Candidate { hit: maybe, t, u: e.v * inv, v: e.w * inv };
+        let mut found = Candidate { hit: maybe, t, u: v * inv, v: w * inv };
         let own = Self::bounds(n);
         let interval = Interval::of(packet, own.lo, own.hi);
         found.hit = maybe & interval.near.cmp_le(interval.far);
@@ -230,7 +230,7 @@ impl Triangle {
     }
 }
 
-/// Normal of a triangle, scaled to a largest component of 1, accurate to a few ulps for any sliver: products of f32
+/// Normal of a triangle, scaled by a power of two to a largest component of about 1, accurate to a few ulps for any sliver: products of f32
 /// differences are exact in f64, those of f64 differences are paired with their rounding errors (Kahan's difference
 /// of products; Jeannerod, Louvet, Muller, "Further analysis of Kahan's algorithm", Math. Comp. 82, 2013).
 #[inline(always)]
@@ -247,7 +247,8 @@ fn unit_normal<S: Real>(n: &[S; 9]) -> [f64; 3] {
         }
     };
     let normal = [minor(1, 2), minor(2, 0), minor(0, 1)];
-    let scale = 1.0 / normal[0].abs().max(normal[1].abs()).max(normal[2].abs());
+    let exponent = normal[0].abs().max(normal[1].abs()).max(normal[2].abs()).to_bits() >> 52;
+    let scale = f64::from_bits((2046 - exponent.min(2045)) << 52);
     normal.map(|x| x * scale)
 }
 
@@ -285,9 +286,7 @@ impl<S: Real> Turned<S> {
 /// axis.
 struct Edges<V> {
     depth: [V; 3],
-    u: V,
-    v: V,
-    w: V,
+    functions: [V; 3],
 }
 
 impl<V: Lanes> Edges<V> {
@@ -302,14 +301,15 @@ impl<V: Lanes> Edges<V> {
             (x, y, z)
         };
         let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (sheared(0), sheared(1), sheared(2));
-        Self { depth: [az, bz, cz], u: cx * by - cy * bx, v: ax * cy - ay * cx, w: bx * ay - by * ax }
+        Self { depth: [az, bz, cz], functions: [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax] }
     }
 
     /// Pairs with edge functions of both signs. A NaN (overflow) is never outside: the restart decides.
     #[inline(always)]
     fn outside(&self) -> V::Mask {
         let zero = V::constant(0.0);
-        let (low, high) = (self.u.fast_min(self.v).fast_min(self.w), self.u.fast_max(self.v).fast_max(self.w));
+        let [u, v, w] = self.functions;
+        let (low, high) = (u.fast_min(v).fast_min(w), u.fast_max(v).fast_max(w));
         low.cmp_lt(zero) & zero.cmp_lt(high)
     }
 }

@@ -89,50 +89,58 @@ fn vector<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
 }
 
+/// Every ray with every triangle, and what is written past the last of them.
+const ROOM: usize = (RAYS + 1) * BLOCK;
+
+/// The set bits of each byte, ascending, then zeros.
+const SET_BITS: [[u8; BLOCK]; 256] = {
+    let mut table = [[0; BLOCK]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut bit, mut count) = (0, 0);
+        while bit < BLOCK {
+            if mask >> bit & 1 != 0 {
+                table[mask][count] = bit as u8;
+                count += 1;
+            }
+            bit += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
 /// Rays of a chunk with triangles of a block that are to be looked at closer.
 #[derive(Clone, Debug)]
-pub struct Pairs {
-    ray: [u8; Self::ROOM],
-    slot: [u8; Self::ROOM],
+pub struct Pairs<S> {
+    /// Rays by their order here.
+    turn: [u8; ROOM],
+    slot: [u8; ROOM],
     len: usize,
+    /// The rays, and their edge functions with all triangles.
+    ray: [u8; RAYS],
+    edges: [[[S; BLOCK]; 3]; RAYS],
 }
 
-impl Default for Pairs {
+impl<S: Real> Default for Pairs<S> {
     fn default() -> Self {
-        Self { ray: [0; Self::ROOM], slot: [0; Self::ROOM], len: 0 }
+        let edges = [[[S::ZERO; BLOCK]; 3]; RAYS];
+        Self { turn: [0; ROOM], slot: [0; ROOM], len: 0, ray: [0; RAYS], edges }
     }
 }
 
-impl Pairs {
-    /// Every ray with every triangle, and what is written past the last of them.
-    const ROOM: usize = (RAYS + 1) * BLOCK;
-
-    /// The set bits of each byte, ascending, then zeros.
-    const SET_BITS: [[u8; BLOCK]; 256] = {
-        let mut table = [[0; BLOCK]; 256];
-        let mut mask = 0;
-        while mask < 256 {
-            let (mut bit, mut count) = (0, 0);
-            while bit < BLOCK {
-                if mask >> bit & 1 != 0 {
-                    table[mask][count] = bit as u8;
-                    count += 1;
-                }
-                bit += 1;
-            }
-            mask += 1;
-        }
-        table
-    };
-
-    /// Adds a ray with the triangles whose bits are set. Always writes eight and takes back those that are too many:
+impl<S: Real> Pairs<S> {
+    /// Adds a ray, the `turn`-th, with the triangles whose bits are set. Always writes eight and takes back those that are too many:
     /// how many there are is a surprise every time.
     #[inline(always)]
-    fn add(&mut self, ray: usize, slots: u32) {
+    fn add(&mut self, turn: usize, ray: usize, slots: u32, edges: [S::Octo; 3]) {
+        let turn = turn & (RAYS - 1);
+        self.ray[turn] = ray as u8;
+        self.edges[turn].iter_mut().zip(edges).for_each(|(to, edge)| edge.store(to));
         let slots = slots as usize & 0xff;
-        let at = self.len.min(Self::ROOM - BLOCK);
-        self.ray[at..at + BLOCK].copy_from_slice(&[ray as u8; BLOCK]);
-        self.slot[at..at + BLOCK].copy_from_slice(&Self::SET_BITS[slots]);
+        let at = self.len.min(ROOM - BLOCK);
+        self.turn[at..at + BLOCK].copy_from_slice(&[turn as u8; BLOCK]);
+        self.slot[at..at + BLOCK].copy_from_slice(&SET_BITS[slots]);
         self.len = at + slots.count_ones() as usize;
     }
 }
@@ -151,11 +159,13 @@ fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
     let block = &object.triangles[child.index as usize];
     let slots = (1 << child.count) - 1;
     walk.pairs.len = 0;
+    let mut turn = 0;
     while rays != 0 {
         let ray = rays.trailing_zeros() as usize & (RAYS - 1);
         rays &= rays - 1;
-        let maybe = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], walk.best.t[ray], block);
-        walk.pairs.add(ray, slots & maybe);
+        let (maybe, edges) = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], walk.best.t[ray], block);
+        walk.pairs.add(turn, ray, slots & maybe, edges);
+        turn += 1;
         if COUNT {
             walk.counters.leaves += 1;
             walk.counters.prims += u64::from(child.count);
@@ -163,10 +173,12 @@ fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
             walk.counters.prim_lanes_total += u64::from(child.count);
         }
     }
-    for at in 0..walk.pairs.len.min(Pairs::ROOM) {
-        let ray = usize::from(walk.pairs.ray[at]) & (RAYS - 1);
-        let slot = usize::from(walk.pairs.slot[at]) & (BLOCK - 1);
-        let found = Triangle::look_closer(&chunk.packet::<S>(ray), &chunk.turned(ray), &block.get(slot));
+    for at in 0..walk.pairs.len.min(ROOM) {
+        let turn = usize::from(walk.pairs.turn[at]) & (RAYS - 1);
+        let (ray, slot) =
+            (usize::from(walk.pairs.ray[turn]) & (RAYS - 1), usize::from(walk.pairs.slot[at]) & (BLOCK - 1));
+        let edges = [0, 1, 2].map(|k| walk.pairs.edges[turn][k][slot]);
+        let found = Triangle::look_closer(&chunk.packet::<S>(ray), &block.get(slot), edges);
         if ANY {
             walk.best.done |= Set::from(found.hit & (found.t <= walk.best.t[ray])) << ray;
         } else {

@@ -55,7 +55,7 @@ pub struct Memory<S> {
     local: Chunk<S>,
     best: Best<S>,
     waiting: walk::Pile<S>,
-    pairs: leaf::Pairs,
+    pairs: leaf::Pairs<S>,
 }
 
 impl<S: Real> Default for Memory<S> {
