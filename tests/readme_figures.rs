@@ -105,7 +105,7 @@ fn a_block_is_made_from_the_newest_run_that_has_all() {
         std::fs::write(dir.path().join(run).join("bench.csv"), format!("{head}\n{}\n", rows.join("\n"))).expect("rows");
     };
     let whole = |run: &str, tile: f64| {
-        vec![
+        [
             row(run, "primary", "scalar", 4.04, "", "1 1 1"),
             row(run, "primary", "tile", tile, "", "0.2 0.1 0.1"),
             row(run, "primary", "peer", 8.0, "true", "0.3 0.3 0.3"),
@@ -113,10 +113,12 @@ fn a_block_is_made_from_the_newest_run_that_has_all() {
         ]
     };
     write("1", &whole("1", 99.0));
-    write("2", &[whole("2", 40.04), vec![row("2", "ao", "scalar", 1.0, "", "1 1 1")]].concat());
+    write("2", &[&whole("2", 40.04)[..], &[row("2", "ao", "scalar", 1.0, "", "1 1 1")]].concat());
     // Newer, but without the peer.
     write("3", &whole("3", 70.0)[..2]);
-    let text = "a\n<!-- figures\nscenes: hall as The hall\nengines: scalar, tile\npeer: peer as A peer\n-->\nold\n\
+    // Newer and whole, but of another build.
+    write("4", &whole("4", 60.0).map(|row| row.replace("avx2", "sse2")));
+    let text = "a\n<!-- figures\nscenes: hall as The hall\nengines: scalar, tile\npeer: peer as A peer\nisa: avx2\n-->\nold\n\
                 <!-- end of figures -->\nb\n";
     let file = dir.path().join("text.md");
     std::fs::write(&file, text).expect("written");

@@ -1,6 +1,6 @@
 //! Some lanes of a vector: their numbers, and their values one after the other.
 
-use super::words::positions;
+use super::words::{list_bits, positions};
 use super::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each};
 
 /// The numbers of the set bits of `bits`, in order.
@@ -98,11 +98,8 @@ impl Chosen {
     /// The lanes whose bits are set.
     #[inline(always)]
     pub fn of(bits: u32) -> Self {
-        let (mut list, mut count) = ([0; MAX_LANES], 0);
-        for lane in lanes_of(bits) {
-            list[count % MAX_LANES] = lane as u8;
-            count += 1;
-        }
+        let mut list = [0; MAX_LANES];
+        let count = list_bits(bits, 0, &mut list);
         Self { bits, list, count }
     }
 

@@ -57,6 +57,21 @@ impl<S: Real> Rays<S> {
         }
     }
 
+    /// Makes room for `len` rays with unspecified contents, for who sets some; [`Self::close`] ends that.
+    pub fn open(&mut self, len: usize) {
+        let padded = len.next_multiple_of(PAD);
+        self.len = len;
+        for array in self.org.iter_mut().chain(&mut self.dir).chain([&mut self.t_min, &mut self.t_max]) {
+            array.resize(padded, S::ZERO);
+        }
+    }
+
+    /// Keeps the first `len` rays, which have been set.
+    pub fn close(&mut self, len: usize) {
+        self.truncate(len);
+        (self.len..self.padded_len()).for_each(|i| self.kill(i));
+    }
+
     /// Keeps the first `len` rays; those after them must be dead.
     pub fn truncate(&mut self, len: usize) {
         let padded = len.next_multiple_of(PAD);
@@ -91,7 +106,8 @@ impl<S: Real> Rays<S> {
         self.t_max[i] = t_max;
     }
 
-    /// Sets rays from `first` on to those of the lanes `chosen` of origins, directions and ends; they start at 0.
+    /// Sets rays from `first` on to those of the lanes `chosen` of origins, directions and ends; they start at 0. What follows
+    /// them is unspecified, as far as a vector reaches.
     #[inline(always)]
     pub fn put(&mut self, first: usize, chosen: &Chosen, [org, dir]: [Lanes3<S::Wide>; 2], t_max: S::Wide) {
         for axis in 0..3 {

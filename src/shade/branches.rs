@@ -29,7 +29,7 @@ impl<S: Real> Branches<S> {
 
     /// None, with room for `most`.
     pub fn open(&mut self, most: usize) {
-        self.rays.reset(most);
+        self.rays.open(most);
         self.path.clear();
         self.weight.iter_mut().for_each(|weight| weight.resize(most.next_multiple_of(MAX_LANES), S::ZERO));
     }
@@ -47,7 +47,7 @@ impl<S: Real> Branches<S> {
 
     /// Ends the additions.
     pub fn close(&mut self) {
-        self.rays.truncate(self.path.len());
+        self.rays.close(self.path.len());
     }
 
     /// Number of rays.

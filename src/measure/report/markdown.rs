@@ -11,7 +11,8 @@
 //! -->
 //! ```
 //!
-//! `scenes` and `engines` are required, `threads` is 1 and `precision` f32 unless said otherwise. What stands between the
+//! `scenes` and `engines` are required, `threads` is 1 and `precision` f32 unless said otherwise; with `isa`, only rows of builds
+//! for it count. What stands between the
 //! comments is replaced.
 
 use std::collections::BTreeSet;
@@ -25,7 +26,7 @@ const BEGIN: &str = "<!-- figures";
 const CLOSE: &str = "-->";
 const END: &str = "<!-- end of figures -->";
 
-const KEYS: [&str; 5] = ["scenes", "engines", "peer", "threads", "precision"];
+const KEYS: [&str; 6] = ["scenes", "engines", "peer", "threads", "precision", "isa"];
 
 /// Longest line of prose.
 const COLUMNS: usize = 120;
@@ -43,6 +44,7 @@ struct Wanted {
     peer: Option<Named>,
     threads: String,
     precision: String,
+    isa: Option<String>,
 }
 
 /// One class of rays in one scene: the rows of the engines, in order, and of the peer's quoted mode.
@@ -103,7 +105,7 @@ impl Wanted {
                 return Err((Some(number), format!("`{}` is given twice", KEYS[key])));
             }
         }
-        let [scenes, engines, peer, threads, precision] = values;
+        let [scenes, engines, peer, threads, precision, isa] = values;
         let required = |value: Option<&str>, key: &str| value.map(names).ok_or((None, format!("expected `{key}:`")));
         Ok(Self {
             scenes: required(scenes, "scenes")?,
@@ -111,6 +113,7 @@ impl Wanted {
             peer: peer.and_then(|value| names(value).pop()),
             threads: threads.unwrap_or("1").into(),
             precision: precision.unwrap_or("f32").into(),
+            isa: isa.map(String::from),
         })
     }
 
@@ -122,6 +125,7 @@ impl Wanted {
                 && [("scene", scene), ("class", class), ("threads", &self.threads), ("precision", &self.precision)]
                     .iter()
                     .all(|(column, value)| row.text(column) == *value)
+                && self.isa.as_deref().is_none_or(|isa| row.text("isa") == isa)
                 && ["", "balanced"].contains(&row.text("preset"))
                 && ["", "8"].contains(&row.text("leaf"))
         };

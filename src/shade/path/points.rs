@@ -52,29 +52,25 @@ impl<V: Lanes> LookLanes<V> {
 /// Points of one model.
 #[derive(Clone, Debug, Default)]
 pub struct Points {
-    /// The ray of the wave that met each.
-    pub ray: Vec<u32>,
-    /// The look of each, by number.
-    pub look: Vec<u32>,
+    /// The ray of the wave that met each, and its look, by number.
+    pub list: Vec<[u32; 2]>,
 }
 
 impl Points {
     /// None, keeping the memory.
     pub fn clear(&mut self) {
-        self.ray.clear();
-        self.look.clear();
+        self.list.clear();
     }
 
     /// Number of points.
     pub fn len(&self) -> usize {
-        self.ray.len()
+        self.list.len()
     }
 
     /// Adds the point that ray `ray` met.
     #[inline(always)]
     pub fn push(&mut self, ray: usize, look: u32) {
-        self.ray.push(ray as u32);
-        self.look.push(look);
+        self.list.push([ray as u32, look]);
     }
 }
 

@@ -41,7 +41,8 @@ pub struct Chances<'a> {
 }
 
 impl Chances<'_> {
-    fn numbers<S: Real>(&self, path: &[u32]) -> Numbers<S> {
+    /// Those of lights only where some `aims` at them.
+    fn numbers<S: Real>(&self, path: &[u32], aims: bool) -> Numbers<S> {
         let zero = [S::ZERO; MAX_LANES];
         let mut numbers =
             Numbers { place: [zero; 2], choice: zero, light: [zero; 2], light_choice: zero, roulette: zero };
@@ -63,8 +64,10 @@ impl Chances<'_> {
         };
         let [x, y] = &mut numbers.place;
         fill(0, x, y);
-        let [x, y] = &mut numbers.light;
-        fill(1, x, y);
+        if aims {
+            let [x, y] = &mut numbers.light;
+            fill(1, x, y);
+        }
         fill(2, &mut numbers.light_choice, &mut numbers.choice);
         if self.bounce >= FIRST_ROULETTE {
             fill(3, &mut numbers.roulette, &mut [S::ZERO; MAX_LANES]);
@@ -95,14 +98,16 @@ struct Packet<V> {
 
 impl<V: Lanes> Packet<V> {
     #[inline(always)]
-    fn load<S: Real<Wide = V>>(arrivals: &Arrivals<'_, S>, rays: &Picked) -> Self
+    fn load<S: Real<Wide = V>>(arrivals: &Arrivals<'_, S>, rays: &Picked, bounce: u32) -> Self
     where
         V: Lanes<Scalar = S>,
     {
         let Arrivals { wave, places, .. } = arrivals;
         let place = places.of(rays);
         let frame = Frame::new(place.shading);
-        let [x, y, z] = frame.to_local(normalize(map3(rays.take3(wave.rays.dir.each_ref()), |d: V| -d)));
+        let back = map3(rays.take3(wave.rays.dir.each_ref()), |d: V| -d);
+        // Only the camera's directions are not unit.
+        let [x, y, z] = frame.to_local(if bounce == 0 { normalize(back) } else { back });
         Self {
             place,
             throughput: rays.take3(wave.throughput.each_ref()),
@@ -136,14 +141,17 @@ impl<S: Real> Paths<'_, S> {
         shadows: &mut Shadows<S>,
     ) {
         let width = <S::Wide as Lanes>::N;
-        for (rays, looks) in points.ray.chunks(width).zip(points.look.chunks(width)) {
-            let mut path = [0; MAX_LANES];
-            path.iter_mut().zip(rays).for_each(|(path, &ray)| *path = arrivals.wave.path[ray as usize]);
-            let path = &path[..rays.len()];
-            let numbers = chances.numbers::<S>(path);
-            let packet = Packet::load(arrivals, &Picked::of::<S::Wide>(rays));
+        let aims = !B::SMOOTH && !self.lights.is_empty();
+        for chunk in points.list.chunks(width) {
+            let [mut path, mut rays, mut looks] = [[0; MAX_LANES]; 3];
+            for (lane, &[ray, look]) in chunk.iter().enumerate().take(MAX_LANES) {
+                (path[lane], rays[lane], looks[lane]) = (arrivals.wave.path[ray as usize], ray, look);
+            }
+            let [path, rays, looks] = [&path, &rays, &looks].map(|list| &list[..chunk.len()]);
+            let numbers = chances.numbers::<S>(path, aims);
+            let packet = Packet::load(arrivals, &Picked::of::<S::Wide>(rays), chances.bounce);
             let bsdf = B::load(&LookLanes::of(arrivals.looks, looks), &self.facets);
-            if !B::SMOOTH && !self.lights.is_empty() {
+            if aims {
                 self.aim(&packet, &bsdf, path, &numbers, shadows);
             }
             go_on(&packet, &bsdf, path, &numbers, chances.bounce, next);

@@ -31,7 +31,7 @@ impl<S: Real> Default for Wave<S> {
 impl<S: Real> Wave<S> {
     /// Empty, with room for `count` rays.
     pub fn open(&mut self, count: usize) {
-        self.rays.reset(count);
+        self.rays.open(count);
         self.path.clear();
         self.columns().into_iter().for_each(|column| column.resize(count.next_multiple_of(PAD), S::ZERO));
     }
@@ -60,7 +60,7 @@ impl<S: Real> Wave<S> {
 
     /// Ends the additions.
     pub fn close(&mut self) {
-        self.rays.truncate(self.path.len());
+        self.rays.close(self.path.len());
     }
 
     /// Origin and direction of ray `i`.
@@ -103,7 +103,7 @@ impl<S: Real> Default for Shadows<S> {
 impl<S: Real> Shadows<S> {
     /// Empty, with room for `count` rays.
     pub fn open(&mut self, count: usize) {
-        self.rays.reset(count);
+        self.rays.open(count);
         self.path.clear();
         self.light.iter_mut().for_each(|column| column.resize(count.next_multiple_of(PAD), S::ZERO));
     }
@@ -119,6 +119,6 @@ impl<S: Real> Shadows<S> {
 
     /// Ends the additions.
     pub fn close(&mut self) {
-        self.rays.truncate(self.path.len());
+        self.rays.close(self.path.len());
     }
 }
