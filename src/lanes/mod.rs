@@ -15,6 +15,7 @@
 pub mod chosen;
 mod ftz;
 mod isa;
+mod packed;
 mod pair;
 pub mod past;
 mod scalar;

@@ -141,7 +141,7 @@ const fn powers64<const N: usize>() -> [u64; N] {
 
 vector_lanes!(f32x4, f32, 4, u32x4, const { powers32() });
 vector_lanes!(f32x8, f32, 8, u32x8, const { powers32() });
-vector_lanes!(f32x16, f32, 16, u32x16, const { powers32() }, super::words::packed);
+vector_lanes!(f32x16, f32, 16, u32x16, const { powers32() }, super::packed::floats);
 vector_lanes!(f64x2, f64, 2, u64x2, const { powers64() });
 vector_lanes!(f64x4, f64, 4, u64x4, const { powers64() });
-vector_lanes!(f64x8, f64, 8, u64x8, const { powers64() }, super::words::packed_doubles);
+vector_lanes!(f64x8, f64, 8, u64x8, const { powers64() }, super::packed::doubles);

@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::alias::Alias;
-use super::emitter::{Aim, Emitter, Form};
+use super::emitter::{Aim, Emitter};
+use super::form::Form;
 use super::sky::Sky;
 use crate::lanes::Real;
 use crate::scene::assembly::{Part, PartKind};

@@ -12,8 +12,10 @@
 //! picture does not depend on what else is in a wave.
 
 mod alias;
+mod arrival;
 mod bsdf;
 mod emitter;
+mod form;
 mod lights;
 mod points;
 mod scatter;
@@ -29,6 +31,7 @@ use glam::DVec3;
 pub(super) use self::bsdf::facets::Rough;
 pub(super) use self::bsdf::fresnel;
 
+use self::arrival::{Arrival, Seen};
 use self::bsdf::facets::FacetsList;
 use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
@@ -37,7 +40,7 @@ use self::lights::Lights;
 use self::points::{LookNumbers, Places, Points, look_numbers};
 use self::scatter::{Arrivals, Chances};
 use self::wave::{Shadows, Wave};
-use super::look::{Look, Looks, Model};
+use super::look::{Looks, Model};
 use super::meeting::{Meeting, Met, met_lanes};
 use super::offset::position_error;
 use super::sample::Sample;
@@ -50,7 +53,7 @@ use crate::lanes::{Lanes, MAX_LANES, Real, each};
 use crate::ray::{Hits, Rays};
 use crate::scene::description::{Description, Material};
 use crate::scene::material::Scattering;
-use crate::scene::world::{Surface, World};
+use crate::scene::world::World;
 use crate::trace::Engine;
 
 /// Shadow rays to a place end this many roundings before it.
@@ -359,43 +362,6 @@ impl<'a, S: Real> Paths<'a, S> {
         let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
         let surface = self.world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);
         Seen { surface, from_front: surface.ng.dot(dir) <= 0.0 }
-    }
-}
-
-/// A surface, and whether it is seen from the side of its normal.
-struct Seen<'w> {
-    surface: Surface<'w>,
-    from_front: bool,
-}
-
-/// A surface with normals towards the viewer and what it scatters with.
-struct Arrival<'w> {
-    surface: Surface<'w>,
-    ng: DVec3,
-    /// `ng` itself where the viewer is behind the shading normal.
-    ns: DVec3,
-    look: Look,
-}
-
-impl<'w> Seen<'w> {
-    /// The same of material `material`, no mixture, seen along `dir`.
-    fn resolved<S: Real>(self, paths: &Paths<'_, S>, material: u32, dir: DVec3) -> Arrival<'w> {
-        let Self { surface, from_front } = self;
-        let turned = |n: DVec3| if from_front { n } else { -n };
-        let (ng, ns) = (turned(surface.ng), turned(paths.looks.bumped(material, &surface)));
-        let ns = if -ns.dot(dir.normalize_or_zero()) > 1e-3 { ns } else { ng };
-        Arrival { surface, ng, ns, look: paths.looks.look(material, &surface, from_front) }
-    }
-}
-
-impl Arrival<'_> {
-    /// What pictures show of the first hit, besides radiance.
-    fn show<S: Real>(&self, i: usize, dir: DVec3, hits: &Hits<S>, seen: &mut Sample) {
-        seen.distance = hits.t[i].to_f64() * dir.length();
-        seen.position = self.surface.position;
-        (seen.normal, seen.shading_normal) = (self.ng, self.ns);
-        seen.albedo = self.look.base;
-        (seen.inst, seen.prim, seen.material) = (hits.inst[i], hits.prim[i], self.surface.material);
     }
 }
 

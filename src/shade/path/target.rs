@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::Paths;
 use super::bsdf::warp::disc;
-use super::emitter::{BALL, FLAT, Form};
+use super::form::{BALL, FLAT, Form};
 use super::scatter::Column;
 use crate::lanes::chosen::{at, records, spill};
 use crate::lanes::space::{Frame, choose, scale, sub};
