@@ -5,6 +5,7 @@
 
 use super::filter::Filter;
 use super::model::Camera;
+use super::passes::Passes;
 use super::sampling::PixelRandom;
 use super::sobol::{PixelPoints, fraction};
 use super::tiles::{FILE_TILE, PixelRect, Tiling, morton_decode};
@@ -80,8 +81,20 @@ pub fn fill_tile<S: Real>(
     sub_pixel: SubPixel,
     rays: &mut Rays<S>,
 ) {
+    fill_passes(camera, tiling, tile, rect, &[sub_pixel], rays);
+}
+
+/// The same with a ray of each pixel for each of `sub_pixels`, in the order of [`Passes`].
+pub fn fill_passes<S: Real>(
+    camera: &Camera,
+    tiling: &Tiling,
+    tile: u32,
+    rect: PixelRect,
+    sub_pixels: &[SubPixel],
+    rays: &mut Rays<S>,
+) {
     let mut pencil = Pencil::default();
-    if aim_tile(camera, tiling, tile, rect, sub_pixel, &mut pencil) {
+    if aim_passes(camera, tiling, tile, rect, sub_pixels, &mut pencil) {
         return pencil.fill(rays);
     }
     let count = pencil.len();
@@ -106,7 +119,19 @@ pub fn aim_tile(
     sub_pixel: SubPixel,
     pencil: &mut Pencil,
 ) -> bool {
-    let count = tiling.rays_per_tile() as usize;
+    aim_passes(camera, tiling, tile, rect, &[sub_pixel], pencil)
+}
+
+/// The same for [`fill_passes`].
+fn aim_passes(
+    camera: &Camera,
+    tiling: &Tiling,
+    tile: u32,
+    rect: PixelRect,
+    sub_pixels: &[SubPixel],
+    pencil: &mut Pencil,
+) -> bool {
+    let passes = Passes::new(tiling, sub_pixels.len() as u32);
     let (x0, y0) = tiling.origin(tile);
     pencil.origin = camera.eye.to_array();
     pencil.axes = [camera.u, camera.v, -camera.n].map(|axis| axis.to_array());
@@ -120,7 +145,7 @@ pub fn aim_tile(
         let r = rows - (f64::from(y) + sy);
         camera.half_height * (2.0 * r / rows - 1.0)
     };
-    if sub_pixel == SubPixel::Anchor {
+    if sub_pixels == [SubPixel::Anchor] {
         let mut lines = [[0.0; FILE_TILE as usize]; 2];
         for k in 0..tiling.edge() {
             lines[0][k as usize] = across(x0 + k, camera.anchor[0]);
@@ -132,39 +157,43 @@ pub fn aim_tile(
             Places::Each(lists) => lists,
             Places::Grid(_) => Default::default(),
         };
-        lists.iter_mut().for_each(|list| list.resize(count, 0.0));
-        for first in (0..count).step_by(BLOCK) {
-            let mut pixels = [[0; BLOCK]; 2];
-            for k in 0..BLOCK {
-                let (dx, dy) = morton_decode((first + k) as u32);
-                (pixels[0][k], pixels[1][k]) = (x0 + dx, y0 + dy);
-            }
-            let offsets = sub_pixel.offsets(camera.anchor, &pixels);
-            let [a, b] = &mut lists;
-            for (k, (a, b)) in a[first..].iter_mut().zip(&mut b[first..]).enumerate().take(BLOCK) {
-                (*a, *b) = (across(pixels[0][k], offsets[0][k]), up(pixels[1][k], offsets[1][k]));
+        lists.iter_mut().for_each(|list| list.resize(passes.rays(), 0.0));
+        for run in passes.runs() {
+            for (pixel, ray) in run.pixels.step_by(BLOCK).zip(run.rays.step_by(BLOCK)) {
+                let mut pixels = [[0; BLOCK]; 2];
+                for k in 0..BLOCK {
+                    let (dx, dy) = morton_decode((pixel + k) as u32);
+                    (pixels[0][k], pixels[1][k]) = (x0 + dx, y0 + dy);
+                }
+                let offsets = sub_pixels[run.pass as usize].offsets(camera.anchor, &pixels);
+                let [a, b] = &mut lists;
+                for (k, (a, b)) in a[ray..].iter_mut().zip(&mut b[ray..]).enumerate().take(BLOCK) {
+                    (*a, *b) = (across(pixels[0][k], offsets[0][k]), up(pixels[1][k], offsets[1][k]));
+                }
             }
         }
         pencil.places = Places::Each(lists);
     }
-    live_pixels(tiling, (x0, y0), rect, &mut pencil.live);
+    live_pixels(tiling, passes, (x0, y0), rect, &mut pencil.live);
     !camera.parallel
 }
 
 /// The rays whose pixels lie in the picture and in `rect`, bit by ray.
-fn live_pixels(tiling: &Tiling, (x0, y0): (u32, u32), rect: PixelRect, live: &mut Vec<u16>) {
+fn live_pixels(tiling: &Tiling, passes: Passes, (x0, y0): (u32, u32), rect: PixelRect, live: &mut Vec<u16>) {
     let wanted = PixelRect { x1: rect.x1.min(tiling.width()), y1: rect.y1.min(tiling.height()), ..rect };
     let last = tiling.edge() - 1;
     live.clear();
-    live.resize(tiling.rays_per_tile() as usize / 16, u16::MAX);
+    live.resize(passes.rays() / 16, u16::MAX);
     if wanted.contains(x0, y0) && wanted.contains(x0 + last, y0 + last) {
         return;
     }
-    for (block, live) in live.iter_mut().enumerate() {
-        let is_wanted = |i: &u32| {
-            let (dx, dy) = morton_decode(block as u32 * 16 + i);
-            wanted.contains(x0 + dx, y0 + dy)
-        };
-        *live = (0..16).filter(is_wanted).fold(0, |live, i| live | 1 << i);
+    for run in passes.runs() {
+        for (live, pixel) in live[run.rays.start / 16..].iter_mut().zip(run.pixels.step_by(16)) {
+            let is_wanted = |i: &u32| {
+                let (dx, dy) = morton_decode(pixel as u32 + i);
+                wanted.contains(x0 + dx, y0 + dy)
+            };
+            *live = (0..16).filter(is_wanted).fold(0, |live, i| live | 1 << i);
+        }
     }
 }

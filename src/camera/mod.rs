@@ -5,6 +5,7 @@ mod framing;
 mod generate;
 mod matrices;
 mod model;
+mod passes;
 pub mod sampling;
 mod scattered;
 pub mod sobol;
@@ -12,7 +13,8 @@ mod tiles;
 
 pub use filter::Filter;
 pub use framing::framing;
-pub use generate::{SubPixel, aim_tile, fill_tile};
+pub use generate::{SubPixel, aim_tile, fill_passes, fill_tile};
 pub use model::{Camera, CameraOverrides};
+pub use passes::{Passes, Run};
 pub use scattered::fill_pixels;
 pub use tiles::{FILE_TILE, PixelRect, Tiling, morton_decode, morton_encode};

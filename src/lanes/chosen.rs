@@ -131,32 +131,60 @@ impl Chosen {
 /// Places in lists from which lanes take their values.
 #[derive(Clone, Copy, Debug)]
 pub struct Picked {
+    /// Counted from `first`.
     at: [u32; MAX_LANES],
-    /// Whether they follow each other, in all lanes.
-    is_run: bool,
+    first: usize,
+    how: How,
+}
+
+/// How places lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum How {
+    /// One after the other, in all lanes.
+    Run,
+    /// Within two vectors.
+    Near,
+    /// Anyhow.
+    Far,
 }
 
 impl Picked {
-    /// Of `list`, one place per lane of `V`; lanes beyond its end have the last one.
+    /// Of `list`, one ascending place per lane of `V` in lists of `len` values; lanes beyond its end have the last one.
     #[inline(always)]
-    pub fn of<V: Lanes>(list: &[u32]) -> Self {
-        let mut at = [list.last().copied().unwrap_or(0); MAX_LANES];
+    pub fn of<V: Lanes>(list: &[u32], len: usize) -> Self {
+        let (lowest, last) = (list.first().map_or(0, |&place| place as usize), list.last().copied().unwrap_or(0));
+        let mut at = [last; MAX_LANES];
         at.iter_mut().zip(list).for_each(|(at, &place)| *at = place);
-        let follow = (0..V::N).fold(true, |follow, lane| follow & (at[lane] == at[0].wrapping_add(lane as u32)));
-        Self { at, is_run: follow && list.len() >= V::N }
+        let first = lowest.min(len.saturating_sub(2 * V::N));
+        let span = last as usize - first;
+        let how = match span {
+            _ if list.len() == V::N && last as usize - lowest == V::N - 1 => How::Run,
+            _ if span < 2 * V::N && len >= 2 * V::N => How::Near,
+            _ => How::Far,
+        };
+        let first = match how {
+            How::Run => lowest,
+            How::Near => first,
+            How::Far => 0,
+        };
+        at.iter_mut().for_each(|at| *at -= first as u32);
+        Self { at, first, how }
     }
 
     /// The value at each lane's place.
     #[inline(always)]
     pub fn take<V: Lanes>(&self, from: &[V::Scalar]) -> V {
-        if self.is_run {
-            return V::load(&from[self.at[0] as usize..]);
+        match self.how {
+            How::Run => V::load(&from[self.first..]),
+            How::Near => V::near(&from[self.first..], &self.at),
+            How::Far => {
+                let mut column = [V::Scalar::ZERO; MAX_LANES];
+                for (x, &at) in column.iter_mut().zip(&self.at).take(V::N) {
+                    *x = from[at as usize];
+                }
+                V::load(&column)
+            }
         }
-        let mut column = [V::Scalar::ZERO; MAX_LANES];
-        for (x, &at) in column.iter_mut().zip(&self.at).take(V::N) {
-            *x = from[at as usize];
-        }
-        V::load(&column)
     }
 
     /// The same of three lists.
@@ -195,16 +223,31 @@ mod tests {
 
     #[test]
     fn lanes_take_from_their_places() {
-        let list: Vec<f32> = (0..40).map(|i| i as f32).collect();
-        let cases: [Vec<u32>; 4] =
-            [(5..21).collect(), (0..16).map(|i| (i * 7) % 40).collect(), vec![39], (30..38).collect()];
-        for places in cases {
-            let taken: f32x16 = Picked::of::<f32x16>(&places).take(&list);
+        let list: Vec<f32> = (0..100).map(|i| i as f32).collect();
+        let spread = |step: u32| (0..16).map(|i| i * step / 2).collect::<Vec<u32>>();
+        let cases = [
+            ((5..21).collect(), How::Run),
+            (spread(3), How::Near),
+            (spread(9), How::Far),
+            (vec![99], How::Near),
+            ((90..98).collect(), How::Near),
+            (vec![69, 71, 84, 99], How::Near),
+            (vec![67, 71, 84, 99], How::Far),
+            ((84..100).collect(), How::Run),
+        ];
+        for (places, how) in cases {
+            let picked = Picked::of::<f32x16>(&places, list.len());
+            let taken: f32x16 = picked.take(&list);
+            assert_eq!(picked.how, how, "{places:?}");
             for lane in 0..16 {
                 assert_eq!(taken.lane(lane), *places.get(lane).unwrap_or(places.last().unwrap()) as f32);
             }
         }
-        assert_eq!(Picked::of::<f64x4>(&[2, 3, 4, 5]).take::<f64x4>(&[0.0, 0.5, 1.0, 1.5, 2.0, 2.5]).lane(3), 2.5);
+        let short: Vec<f64> = (0..6).map(|i| f64::from(i) * 0.5).collect();
+        for places in [[2, 3, 4, 5], [0, 2, 3, 5]] {
+            let picked = Picked::of::<f64x4>(&places, 6);
+            assert_eq!(picked.take::<f64x4>(&short).to_array(), places.map(|place| f64::from(place) * 0.5));
+        }
     }
 
     #[test]

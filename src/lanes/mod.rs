@@ -15,7 +15,7 @@
 pub mod chosen;
 mod ftz;
 mod isa;
-mod packed;
+mod moved;
 mod pair;
 pub mod past;
 mod scalar;
@@ -97,6 +97,14 @@ pub trait Lanes:
         self.store(&mut from);
         let lanes = chosen::lanes_of(bits & Self::ALL);
         to.iter_mut().zip(lanes).for_each(|(to, lane)| *to = from[lane % MAX_LANES]);
+        Self::load(&to)
+    }
+
+    /// The values of `from` at the places `at`, one per lane, all below `2 N`; `from` has `2 N` values.
+    #[inline(always)]
+    fn near(from: &[Self::Scalar], at: &[u32; MAX_LANES]) -> Self {
+        let (from, mut to) = (&from[..2 * Self::N], [Self::Scalar::ZERO; MAX_LANES]);
+        to.iter_mut().zip(at).take(Self::N).for_each(|(to, &at)| *to = from[at as usize % (2 * Self::N)]);
         Self::load(&to)
     }
 

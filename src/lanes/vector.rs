@@ -11,7 +11,7 @@ use super::{LaneMask, Lanes};
 pub struct VectorMask<V>(V);
 
 macro_rules! vector_lanes {
-    ($v:ident, $s:ident, $n:literal, $int:ident, $bits:expr $(, $packed:path)?) => {
+    ($v:ident, $s:ident, $n:literal, $int:ident, $bits:expr $(, $packed:path, $near:path)?) => {
         impl std::ops::BitAnd for VectorMask<$v> {
             type Output = Self;
             #[inline(always)]
@@ -114,6 +114,10 @@ macro_rules! vector_lanes {
                 fn packed(self, bits: u32) -> Self {
                     $packed(self, bits)
                 }
+                #[inline(always)]
+                fn near(from: &[$s], at: &[u32; super::MAX_LANES]) -> Self {
+                    $near(from.first_chunk().expect("two vectors' worth of values"), at)
+                }
             )?
         }
     };
@@ -141,7 +145,7 @@ const fn powers64<const N: usize>() -> [u64; N] {
 
 vector_lanes!(f32x4, f32, 4, u32x4, const { powers32() });
 vector_lanes!(f32x8, f32, 8, u32x8, const { powers32() });
-vector_lanes!(f32x16, f32, 16, u32x16, const { powers32() }, super::packed::floats);
+vector_lanes!(f32x16, f32, 16, u32x16, const { powers32() }, super::moved::packed_floats, super::moved::near_floats);
 vector_lanes!(f64x2, f64, 2, u64x2, const { powers64() });
 vector_lanes!(f64x4, f64, 4, u64x4, const { powers64() });
-vector_lanes!(f64x8, f64, 8, u64x8, const { powers64() }, super::packed::doubles);
+vector_lanes!(f64x8, f64, 8, u64x8, const { powers64() }, super::moved::packed_doubles, super::moved::near_doubles);

@@ -1,7 +1,7 @@
-//! The planes of a picture by name, and what of a sample each shows.
+//! The planes of a picture by name, and what of a pixel each shows.
 
+use super::pixels::Pixel;
 use crate::error::{Error, Result, nearest_name};
-use crate::shade::Sample;
 
 /// One plane of a film.
 #[derive(Clone, Copy, Debug)]
@@ -16,17 +16,17 @@ pub struct Channel {
 #[derive(Clone, Copy, Debug)]
 pub enum Get {
     /// Rounded to f32.
-    F32(fn(&Sample) -> f64),
+    F32(fn(&Pixel) -> f64),
     /// As it is.
-    U32(fn(&Sample) -> u32),
+    U32(fn(&Pixel) -> u32),
 }
 
 /// The planes every picture has: linear colour and coverage.
 pub const COLOR: [Channel; 4] = [
-    Channel { name: "R", get: Get::F32(|s| s.radiance.x) },
-    Channel { name: "G", get: Get::F32(|s| s.radiance.y) },
-    Channel { name: "B", get: Get::F32(|s| s.radiance.z) },
-    Channel { name: "A", get: Get::F32(|s| s.alpha) },
+    Channel { name: "R", get: Get::F32(|p| p.color.radiance.x) },
+    Channel { name: "G", get: Get::F32(|p| p.color.radiance.y) },
+    Channel { name: "B", get: Get::F32(|p| p.color.radiance.z) },
+    Channel { name: "A", get: Get::F32(|p| p.color.alpha) },
 ];
 
 /// A group of planes besides R, G, B and A.
@@ -56,7 +56,7 @@ pub enum Aov {
     Variance,
     /// `samples`: number of samples, u32.
     Samples,
-    /// `cost.nodes`: node visits per primary ray (see [`crate::shade::Sample::nodes`]).
+    /// `cost.nodes`: node visits per primary ray (see [`crate::shade::FirstHit::nodes`]).
     Cost,
     /// `cryptoObject00.R` and so on, `cryptoMaterial00.R` and so on: ids and coverages of what a pixel shows
     /// ([`crate::film::cryptomatte`]).
@@ -106,43 +106,43 @@ impl Aov {
     /// Its planes that show one number of a pixel; those of [`Self::Cryptomatte`] are made otherwise.
     pub fn channels(self) -> &'static [Channel] {
         match self {
-            Self::Z => &[Channel { name: "Z", get: Get::F32(|s| s.distance) }],
+            Self::Z => &[Channel { name: "Z", get: Get::F32(|p| p.hit.distance) }],
             Self::Normal => &[
-                Channel { name: "N.X", get: Get::F32(|s| s.normal.x) },
-                Channel { name: "N.Y", get: Get::F32(|s| s.normal.y) },
-                Channel { name: "N.Z", get: Get::F32(|s| s.normal.z) },
+                Channel { name: "N.X", get: Get::F32(|p| p.hit.normal.x) },
+                Channel { name: "N.Y", get: Get::F32(|p| p.hit.normal.y) },
+                Channel { name: "N.Z", get: Get::F32(|p| p.hit.normal.z) },
             ],
             Self::Albedo => &[
-                Channel { name: "albedo.R", get: Get::F32(|s| s.albedo.x) },
-                Channel { name: "albedo.G", get: Get::F32(|s| s.albedo.y) },
-                Channel { name: "albedo.B", get: Get::F32(|s| s.albedo.z) },
+                Channel { name: "albedo.R", get: Get::F32(|p| p.hit.albedo.x) },
+                Channel { name: "albedo.G", get: Get::F32(|p| p.hit.albedo.y) },
+                Channel { name: "albedo.B", get: Get::F32(|p| p.hit.albedo.z) },
             ],
-            Self::Instance => &[Channel { name: "id.instance", get: Get::U32(|s| s.inst) }],
-            Self::Primitive => &[Channel { name: "id.primitive", get: Get::U32(|s| s.prim) }],
-            Self::Cost => &[Channel { name: "cost.nodes", get: Get::F32(|s| s.nodes) }],
+            Self::Instance => &[Channel { name: "id.instance", get: Get::U32(|p| p.hit.inst) }],
+            Self::Primitive => &[Channel { name: "id.primitive", get: Get::U32(|p| p.hit.prim) }],
+            Self::Cost => &[Channel { name: "cost.nodes", get: Get::F32(|p| p.hit.nodes) }],
             Self::Position => &[
-                Channel { name: "P.X", get: Get::F32(|s| s.position.x) },
-                Channel { name: "P.Y", get: Get::F32(|s| s.position.y) },
-                Channel { name: "P.Z", get: Get::F32(|s| s.position.z) },
+                Channel { name: "P.X", get: Get::F32(|p| p.hit.position.x) },
+                Channel { name: "P.Y", get: Get::F32(|p| p.hit.position.y) },
+                Channel { name: "P.Z", get: Get::F32(|p| p.hit.position.z) },
             ],
             Self::ShadingNormal => &[
-                Channel { name: "Ns.X", get: Get::F32(|s| s.shading_normal.x) },
-                Channel { name: "Ns.Y", get: Get::F32(|s| s.shading_normal.y) },
-                Channel { name: "Ns.Z", get: Get::F32(|s| s.shading_normal.z) },
+                Channel { name: "Ns.X", get: Get::F32(|p| p.hit.shading_normal.x) },
+                Channel { name: "Ns.Y", get: Get::F32(|p| p.hit.shading_normal.y) },
+                Channel { name: "Ns.Z", get: Get::F32(|p| p.hit.shading_normal.z) },
             ],
             Self::Direct => &[
-                Channel { name: "direct.R", get: Get::F32(|s| s.direct.x) },
-                Channel { name: "direct.G", get: Get::F32(|s| s.direct.y) },
-                Channel { name: "direct.B", get: Get::F32(|s| s.direct.z) },
+                Channel { name: "direct.R", get: Get::F32(|p| p.hit.direct.x) },
+                Channel { name: "direct.G", get: Get::F32(|p| p.hit.direct.y) },
+                Channel { name: "direct.B", get: Get::F32(|p| p.hit.direct.z) },
             ],
             Self::Indirect => &[
-                Channel { name: "indirect.R", get: Get::F32(|s| s.radiance.x - s.direct.x) },
-                Channel { name: "indirect.G", get: Get::F32(|s| s.radiance.y - s.direct.y) },
-                Channel { name: "indirect.B", get: Get::F32(|s| s.radiance.z - s.direct.z) },
+                Channel { name: "indirect.R", get: Get::F32(|p| p.color.radiance.x - p.hit.direct.x) },
+                Channel { name: "indirect.G", get: Get::F32(|p| p.color.radiance.y - p.hit.direct.y) },
+                Channel { name: "indirect.B", get: Get::F32(|p| p.color.radiance.z - p.hit.direct.z) },
             ],
-            Self::Material => &[Channel { name: "id.material", get: Get::U32(|s| s.material) }],
-            Self::Variance => &[Channel { name: "variance", get: Get::F32(|s| s.square) }],
-            Self::Samples => &[Channel { name: "samples", get: Get::U32(|s| s.samples) }],
+            Self::Material => &[Channel { name: "id.material", get: Get::U32(|p| p.hit.material) }],
+            Self::Variance => &[Channel { name: "variance", get: Get::F32(|p| p.variance) }],
+            Self::Samples => &[Channel { name: "samples", get: Get::U32(|p| p.samples) }],
             Self::Cryptomatte => &[],
         }
     }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use super::aov::Aov;
+use crate::camera::Passes;
 use crate::error::locked;
 use crate::film::{Film, Plane, PlaneData, Window, cryptomatte};
 use crate::lanes::Real;
@@ -13,7 +14,7 @@ use crate::ray::INVALID_ID;
 use crate::scene::assembly::{Assembly, PartKind};
 use crate::scene::description::{Description, Shape};
 use crate::scene::world::World;
-use crate::shade::Sample;
+use crate::shade::FirstHit;
 
 /// Layers: objects, materials.
 const LAYERS: [&str; 2] = ["cryptoObject", "cryptoMaterial"];
@@ -64,14 +65,15 @@ impl<'a> Mattes<'a> {
         Some(Self { assembly, description, placed, first_plane, seen: Mutex::default() })
     }
 
-    /// Counts `samples` into the coverages of their pixels; those of misses count for nothing.
-    pub fn count(&self, samples: &[Sample], coverages: &mut Vec<Coverage>) {
-        coverages.resize_with(samples.len(), Coverage::default);
-        for (sample, coverage) in samples.iter().zip(coverages) {
-            if sample.inst == INVALID_ID {
+    /// Counts what `passes` over the `pixels` pixels of a tile met into the coverages of the pixels; misses count for nothing.
+    pub fn count(&self, passes: Passes, pixels: usize, hits: &[FirstHit], coverages: &mut Vec<Coverage>) {
+        coverages.resize_with(pixels, Coverage::default);
+        for (pixel, ray) in passes.runs().flat_map(|run| run.pixels.zip(run.rays)) {
+            let (hit, coverage) = (&hits[ray], &mut coverages[pixel]);
+            if hit.inst == INVALID_ID {
                 continue;
             }
-            for (thing, list) in [self.object(sample), [sample.material, 0, 0]].into_iter().zip(&mut coverage.0) {
+            for (thing, list) in [self.object(hit), [hit.material, 0, 0]].into_iter().zip(&mut coverage.0) {
                 match list.iter_mut().find(|(known, _)| *known == thing) {
                     Some((_, count)) => *count += 1,
                     None => list.push((thing, 1)),
@@ -80,17 +82,17 @@ impl<'a> Mattes<'a> {
         }
     }
 
-    fn object(&self, sample: &Sample) -> Thing {
-        let object = &self.assembly.objects[self.assembly.placements[sample.inst as usize].object as usize];
-        let part = object.parts.partition_point(|part| part.first_prim <= sample.prim).saturating_sub(1);
+    fn object(&self, hit: &FirstHit) -> Thing {
+        let object = &self.assembly.objects[self.assembly.placements[hit.inst as usize].object as usize];
+        let part = object.parts.partition_point(|part| part.first_prim <= hit.prim).saturating_sub(1);
         let group = match &object.parts[part].kind {
             PartKind::Mesh(mesh) => {
-                let triangle = sample.prim - object.parts[part].first_prim;
+                let triangle = hit.prim - object.parts[part].first_prim;
                 mesh.groups.partition_point(|group| group.first <= triangle).saturating_sub(1)
             }
             PartKind::Shape(_) | PartKind::Solids(_) => 0,
         };
-        [sample.inst, part as u32, group as u32]
+        [hit.inst, part as u32, group as u32]
     }
 
     /// What layer `layer` calls `thing`. Objects: group of the scene, name or kind of the part; where the group is

@@ -1,12 +1,14 @@
 //! Pictures: tiles over threads, samples into pixels, pixels into a film; at once, or block by block while one watches.
 
 mod aov;
+mod canvas;
 mod mattes;
 mod options;
 mod patch;
 mod pixels;
 pub mod progressive;
 mod scheduler;
+mod sums;
 mod tally;
 
 pub use aov::Aov;

@@ -1,8 +1,8 @@
 //! Pixels into planes.
 
 use super::aov::{Aov, COLOR, Channel, Get};
+use super::pixels::Pixel;
 use crate::film::{Film, Plane, PlaneData, Window};
-use crate::shade::Sample;
 
 /// The planes of a picture: colour, coverage, and those of `aovs`.
 pub(super) fn channels(aovs: &[Aov]) -> Vec<Channel> {
@@ -14,8 +14,8 @@ pub(super) fn channels(aovs: &[Aov]) -> Vec<Channel> {
 pub(super) fn empty_film(size: (u32, u32), window: Window, channels: &[Channel]) -> Film {
     let area = window.area() as usize;
     let data = |channel: &Channel| match channel.get {
-        Get::F32(get) => PlaneData::F32(vec![get(&Sample::MISS) as f32; area]),
-        Get::U32(get) => PlaneData::U32(vec![get(&Sample::MISS); area]),
+        Get::F32(get) => PlaneData::F32(vec![get(&Pixel::EMPTY) as f32; area]),
+        Get::U32(get) => PlaneData::U32(vec![get(&Pixel::EMPTY); area]),
     };
     let planes = channels.iter().map(|channel| Plane { name: channel.name.to_string(), data: data(channel) }).collect();
     Film { width: size.0, height: size.1, window, planes, texts: Vec::new() }
@@ -33,9 +33,9 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// Takes the values of those of `pixels` that lie in `window` from `samples`, parallel to them, and forgets earlier
+    /// Takes the planes' values of those of `pixels` that lie in `window` from `values`, parallel to them, and forgets earlier
     /// ones; `channels` are the same each time.
-    pub fn fill(&mut self, channels: &[Channel], window: Window, pixels: &[(u32, u32)], samples: &[Sample]) {
+    pub fn fill(&mut self, channels: &[Channel], window: Window, pixels: &[(u32, u32)], values: &[Pixel]) {
         self.places.clear();
         self.kept.clear();
         for (number, &(x, y)) in pixels.iter().enumerate() {
@@ -50,22 +50,22 @@ impl Patch {
                 Get::U32(_) => PlaneData::U32(Vec::new()),
             }));
         }
-        let kept = self.kept.iter().map(|&number| &samples[number as usize]);
+        let kept = self.kept.iter().map(|&number| &values[number as usize]);
         let (color, further) = self.values.split_at_mut(COLOR.len());
         if let [PlaneData::F32(r), PlaneData::F32(g), PlaneData::F32(b), PlaneData::F32(a)] = color {
             [&mut *r, &mut *g, &mut *b, &mut *a].into_iter().for_each(Vec::clear);
-            for sample in kept.clone() {
-                r.push(sample.radiance.x as f32);
-                g.push(sample.radiance.y as f32);
-                b.push(sample.radiance.z as f32);
-                a.push(sample.alpha as f32);
+            for pixel in kept.clone() {
+                r.push(pixel.color.radiance.x as f32);
+                g.push(pixel.color.radiance.y as f32);
+                b.push(pixel.color.radiance.z as f32);
+                a.push(pixel.color.alpha as f32);
             }
         }
         for (channel, values) in channels[COLOR.len()..].iter().zip(further) {
             match (channel.get, values) {
                 (Get::F32(get), PlaneData::F32(values)) => {
                     values.clear();
-                    values.extend(kept.clone().map(|sample| get(sample) as f32));
+                    values.extend(kept.clone().map(|pixel| get(pixel) as f32));
                 }
                 (Get::U32(get), PlaneData::U32(values)) => {
                     values.clear();
@@ -104,13 +104,16 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::shade::{FirstHit, Rgba};
 
     #[test]
     fn planes_are_named_and_row_major_over_the_window() {
         let window = Window { x0: 4, y0: 2, x1: 7, y1: 4 };
         let channels = channels(&[Aov::Primitive, Aov::Z]);
         let mut film = empty_film((10, 10), window, &channels);
-        let pixel = Sample { radiance: DVec3::new(1.0, 2.0, 3.0), alpha: 1.0, distance: 4.0, prim: 9, ..Sample::MISS };
+        let color = Rgba { radiance: DVec3::new(1.0, 2.0, 3.0), alpha: 1.0 };
+        let hit = FirstHit { distance: 4.0, prim: 9, ..FirstHit::NONE };
+        let pixel = Pixel { color, hit, ..Pixel::EMPTY };
         let mut patch = Patch::default();
         patch.fill(&channels, window, &[(4, 2)], &[pixel]);
         patch.fill(&channels, window, &[(5, 3), (7, 3), (5, 4)], &[pixel; 3]);

@@ -1,26 +1,27 @@
 //! Tiles over the threads of the current rayon pool.
 
-use std::mem::take;
 use std::sync::Mutex;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::aov::Channel;
+use super::canvas::{Canvas, Memory};
 use super::mattes::{Coverage, Mattes};
 use super::options::{Progress, RenderOptions, rect_of};
-use super::patch::{Patch, channels, empty_film};
-use super::pixels::{add, add_light, alone, begin, mean, variance};
+use super::patch::{channels, empty_film};
+use super::pixels::Pixel;
+use super::sums::Sums;
 use super::tally::Tally;
-use crate::camera::{Camera, PixelRect, Tiling, fill_tile, morton_decode};
+use crate::camera::Camera;
 use crate::error::{Result, locked};
 use crate::film::Film;
 use crate::film::Window;
 use crate::lanes::Real;
-use crate::ray::{Counters, Rays};
+use crate::ray::Counters;
 use crate::scene::description::Description;
 use crate::scene::world::World;
-use crate::shade::{PathStats, RayCounts, Sample, Shader, Workspace, headlight};
+use crate::shade::{PathStats, RayCounts, Shader, headlight};
 use crate::trace::{Engine, Engines, engine};
 
 /// Samples per pixel of the first round when the number is found while rendering; then it doubles.
@@ -90,15 +91,15 @@ pub fn render_with<S: Real>(
     let mut film = empty_film((options.width, options.height), window, &channels);
     let mattes = Mattes::new(world, description, &options.aovs, &mut film);
     let film = Mutex::new(film);
-    let rect = rect_of(window);
-    let job = Job { shader, camera, tiling, rect, window, channels, mattes, options, progress, start };
-    let tiles = tiling.tiles_in(job.rect);
-    let paint = |sums: &mut Sums, pixels: &[(u32, u32)], patch: &mut Patch| {
-        job.fill(patch, sums, pixels);
+    let canvas = Canvas { camera, options, tiling, rect: rect_of(window) };
+    let tiles = tiling.tiles_in(canvas.rect);
+    let job = Job { shader, canvas, window, channels, mattes, progress, start };
+    let paint = |tile: &Tile, memory: &mut Memory<S>| {
+        job.fill(tile, memory);
         let mut film = locked(&film);
-        patch.paint(&mut film);
+        memory.patch.paint(&mut film);
         if let Some(mattes) = &job.mattes {
-            mattes.paint(&mut film, window, pixels, &sums.coverages, sums.count);
+            mattes.paint(&mut film, window, &memory.pixels, &tile.coverages, tile.count);
         }
         drop(film);
         progress.tile_done(tiles.len() as u64);
@@ -106,17 +107,16 @@ pub fn render_with<S: Real>(
     let tally = if options.is_adaptive() {
         job.rounds(&tiles, paint)
     } else {
-        let one_tile = |memory: &mut TileMemory<S>, &tile: &u32| {
-            let mut sums = take(&mut memory.sums);
-            sums.start();
-            let finished = job.samples(tile, options.spp, &mut sums, memory);
+        let one_tile = |(memory, tile): &mut (Memory<S>, Tile), &number: &u32| {
+            tile.start(number);
+            let finished = job.samples(tile, options.spp, memory);
             if finished {
-                paint(&mut sums, &memory.pixels, &mut memory.patch);
+                paint(tile, memory);
             }
-            memory.sums = sums;
             Tally::take(&mut memory.work, u64::from(finished))
         };
-        tiles.par_iter().map_init(TileMemory::default, one_tile).reduce(Tally::default, Tally::plus)
+        let memory = || (Memory::default(), job.tile());
+        tiles.par_iter().map_init(memory, one_tile).reduce(Tally::default, Tally::plus)
     };
     let mut film = film.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
     if let Some(mattes) = job.mattes {
@@ -136,155 +136,107 @@ pub fn render_with<S: Real>(
 /// What all tiles of a render share.
 struct Job<'a, S: Real> {
     shader: Shader<'a, S>,
-    camera: &'a Camera,
-    tiling: Tiling,
-    rect: PixelRect,
+    canvas: Canvas<'a>,
     window: Window,
     channels: Vec<Channel>,
     mattes: Option<Mattes<'a>>,
-    options: &'a RenderOptions,
     progress: &'a dyn Progress,
     start: Instant,
 }
 
-/// The sums of a tile's samples, in the order of its rays.
-#[derive(Default)]
-struct Sums {
-    pixels: Vec<Sample>,
-    /// What they met, if it is wanted.
-    coverages: Vec<Coverage>,
+/// A tile in the making.
+struct Tile {
+    number: u32,
     /// Samples of each pixel so far.
     count: u32,
-}
-
-impl Sums {
-    fn start(&mut self) {
-        self.pixels.clear();
-        self.coverages.iter_mut().for_each(Coverage::clear);
-        self.count = 0;
-    }
-
-    /// Estimate of the relative error of the pixels' mean brightness: root of the mean variance over the mean.
-    fn error(&self) -> f64 {
-        let n = f64::from(self.count);
-        let mean: f64 = self.pixels.iter().map(|p| p.radiance.element_sum() / (3.0 * n)).sum();
-        let square: f64 = self.pixels.iter().map(|p| variance(p, self.count)).sum();
-        let pixels = self.pixels.len() as f64;
-        if square > 0.0 { (square / pixels).sqrt() / (mean / pixels).max(f64::MIN_POSITIVE) } else { 0.0 }
-    }
-}
-
-/// One thread's arrays, reused from tile to tile.
-struct TileMemory<S> {
-    rays: Rays<S>,
-    work: Workspace<S>,
-    /// Pixel of each ray, also of dead ones.
-    pixels: Vec<(u32, u32)>,
-    samples: Vec<Sample>,
+    /// Their sums, in the order of the pixels.
     sums: Sums,
-    patch: Patch,
+    /// What they met, if it is wanted.
+    coverages: Vec<Coverage>,
 }
 
-impl<S: Real> Default for TileMemory<S> {
-    fn default() -> Self {
-        Self {
-            rays: Rays::new(0),
-            work: Workspace::default(),
-            pixels: Vec::new(),
-            samples: Vec::new(),
-            sums: Sums::default(),
-            patch: Patch::default(),
-        }
+impl Tile {
+    /// Makes it tile number `number`, without samples.
+    fn start(&mut self, number: u32) {
+        (self.number, self.count) = (number, 0);
+        self.sums.clear();
+        self.coverages.iter_mut().for_each(Coverage::clear);
     }
 }
 
 impl<S: Real> Job<'_, S> {
-    /// Pixel of each ray of a tile.
-    fn list_pixels(&self, tile: u32, pixels: &mut Vec<(u32, u32)>) {
-        let (x0, y0) = self.tiling.origin(tile);
-        pixels.clear();
-        pixels.extend((0..self.tiling.rays_per_tile()).map(|i| {
-            let (dx, dy) = morton_decode(i);
-            (x0 + dx, y0 + dy)
-        }));
+    /// Some tile.
+    fn tile(&self) -> Tile {
+        let sums = Sums::new(!self.canvas.options.aovs.is_empty());
+        Tile { number: 0, count: 0, sums, coverages: Vec::new() }
     }
 
-    /// Adds samples to `sums` until there are `spp` of each pixel; false if stopped before.
-    fn samples(&self, tile: u32, spp: u32, sums: &mut Sums, memory: &mut TileMemory<S>) -> bool {
-        self.list_pixels(tile, &mut memory.pixels);
-        while sums.count < spp {
+    /// Adds samples to `tile` until there are `spp` of each pixel; false if stopped before.
+    fn samples(&self, tile: &mut Tile, spp: u32, memory: &mut Memory<S>) -> bool {
+        self.canvas.list_pixels(tile.number, memory);
+        tile.sums.make_room(memory.pixels.len());
+        while tile.count < spp {
             if self.progress.stopped() {
                 return false;
             }
-            let sample = sums.count;
-            let sub_pixel = self.options.sub_pixel(sample);
-            fill_tile(self.camera, &self.tiling, tile, self.rect, sub_pixel, &mut memory.rays);
-            self.shader.shade(&memory.rays, &memory.pixels, sample, &mut memory.work, &mut memory.samples);
+            let numbers = tile.count..spp.min(tile.count + self.shader.passes(tile.count));
+            let passes = self.canvas.shade(&self.shader, tile.number, numbers, memory);
             if let Some(mattes) = &self.mattes {
-                mattes.count(&memory.samples, &mut sums.coverages);
+                mattes.count(passes, memory.pixels.len(), &memory.samples.hits, &mut tile.coverages);
             }
-            if sums.count == 0 {
-                std::mem::swap(&mut sums.pixels, &mut memory.samples);
-                sums.pixels.iter_mut().for_each(begin);
-            } else if self.options.aovs.is_empty() {
-                sums.pixels.iter_mut().zip(&memory.samples).for_each(|(sum, sample)| add_light(sum, sample));
-            } else {
-                sums.pixels.iter_mut().zip(&memory.samples).for_each(|(sum, sample)| add(sum, sample));
-            }
-            sums.count += 1;
+            tile.sums.add_passes(passes, &memory.samples);
+            tile.count += passes.count();
         }
         true
     }
 
     /// Rounds over all tiles, each doubling the samples, until all have the wanted samples or little noise, or the
     /// time is over. Then calls `paint` for each tile that has samples.
-    fn rounds(&self, tiles: &[u32], paint: impl Fn(&mut Sums, &[(u32, u32)], &mut Patch) + Sync) -> Tally {
-        let (spp, limit) = (self.options.spp, self.options.time_limit.unwrap_or(f64::INFINITY));
+    fn rounds(&self, tiles: &[u32], paint: impl Fn(&Tile, &mut Memory<S>) + Sync) -> Tally {
+        let (spp, limit) = (self.canvas.options.spp, self.canvas.options.time_limit.unwrap_or(f64::INFINITY));
         let in_time = || self.start.elapsed().as_secs_f64() < limit;
-        let mut states: Vec<(u32, Sums, bool)> = tiles.iter().map(|&tile| (tile, Sums::default(), false)).collect();
+        let mut states: Vec<(Tile, bool)> =
+            tiles.iter().map(|&number| (Tile { number, ..self.tile() }, false)).collect();
         let mut total = Tally::default();
         let mut target = FIRST_ROUND.min(spp);
         loop {
-            let one_tile = |memory: &mut TileMemory<S>, (tile, sums, is_done): &mut (u32, Sums, bool)| {
+            let one_tile = |memory: &mut Memory<S>, (tile, is_done): &mut (Tile, bool)| {
                 if *is_done {
                     return Tally::default();
                 }
                 // The first samples are made even when the time is over: every pixel has some.
-                while sums.count < target && (sums.count == 0 || in_time()) {
-                    let next = sums.count + 1;
-                    if !self.samples(*tile, next, sums, memory) {
+                while tile.count < target && (tile.count == 0 || in_time()) {
+                    let next = target.min(tile.count + self.shader.passes(tile.count));
+                    if !self.samples(tile, next, memory) {
                         break;
                     }
                 }
-                *is_done = self.options.noise.is_some_and(|noise| sums.count >= FIRST_ROUND && sums.error() <= noise);
+                let is_even = |noise| tile.count >= FIRST_ROUND && tile.sums.error(tile.count) <= noise;
+                *is_done = self.canvas.options.noise.is_some_and(is_even);
                 Tally::take(&mut memory.work, 0)
             };
-            let round = states.par_iter_mut().map_init(TileMemory::default, one_tile);
+            let round = states.par_iter_mut().map_init(Memory::default, one_tile);
             total = total.plus(round.reduce(Tally::default, Tally::plus));
-            if target >= spp || !in_time() || self.progress.stopped() || states.iter().all(|state| state.2) {
+            if target >= spp || !in_time() || self.progress.stopped() || states.iter().all(|(_, is_done)| *is_done) {
                 break;
             }
             target = target.saturating_mul(2).min(spp);
         }
-        let finished = |memory: &mut TileMemory<S>, (tile, sums, _): &mut (u32, Sums, bool)| {
-            if sums.count == 0 {
+        let finished = |memory: &mut Memory<S>, (tile, _): &mut (Tile, bool)| {
+            if tile.count == 0 {
                 return Tally::default();
             }
-            self.list_pixels(*tile, &mut memory.pixels);
-            paint(sums, &memory.pixels, &mut memory.patch);
+            self.canvas.list_pixels(tile.number, memory);
+            paint(tile, memory);
             Tally { done: 1, ..Tally::default() }
         };
-        let painted = states.par_iter_mut().map_init(TileMemory::default, finished);
+        let painted = states.par_iter_mut().map_init(Memory::default, finished);
         total.plus(painted.reduce(Tally::default, Tally::plus))
     }
 
-    /// Takes what the planes get from a finished tile, whose sums become means.
-    fn fill(&self, patch: &mut Patch, sums: &mut Sums, pixels: &[(u32, u32)]) {
-        if sums.count == 1 {
-            sums.pixels.iter_mut().for_each(alone);
-        } else {
-            sums.pixels.iter_mut().for_each(|sum| *sum = mean(sum, sums.count));
-        }
-        patch.fill(&self.channels, self.window, pixels, &sums.pixels);
+    /// Takes what the planes get from a finished tile, whose pixels `memory` lists.
+    fn fill(&self, tile: &Tile, memory: &mut Memory<S>) {
+        let pixels: Vec<Pixel> = tile.sums.pixels(tile.count).collect();
+        memory.patch.fill(&self.channels, self.window, &memory.pixels, &pixels);
     }
 }

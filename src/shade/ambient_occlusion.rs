@@ -1,7 +1,8 @@
 //! Ambient occlusion.
 
-use super::sample::Sample;
+use super::sample::Rgba;
 use super::shader::{Shader, Workspace};
+use super::spot::Spot;
 use super::vertices::NORMAL;
 use crate::camera::sampling::{PixelRandom, cosine_hemisphere};
 use crate::lanes::Real;
@@ -13,14 +14,7 @@ const DIMENSION: u32 = 1;
 impl<S: Real> Shader<'_, S> {
     /// The share of cosine-distributed directions that are free up to the occlusion length, as grey; misses black.
     /// One batch per direction number, each with one ray per first hit.
-    pub(super) fn ambient_occlusion(
-        &self,
-        rays: &Rays<S>,
-        pixels: &[(u32, u32)],
-        sample: u32,
-        work: &mut Workspace<S>,
-        out: &mut [Sample],
-    ) {
+    pub(super) fn ambient_occlusion(&self, rays: &Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut [Rgba]) {
         let rounds = self.settings.ao_samples;
         let (zero, length) = (S::from_f64(0.0), S::from_f64(self.ao_length));
         let mut vertices = std::mem::take(&mut work.vertices);
@@ -28,10 +22,10 @@ impl<S: Real> Shader<'_, S> {
         self.meet(rays, &work.hits, &mut vertices);
         let met: Vec<usize> = (0..rays.len()).filter(|i| work.hits.is_hit(*i)).collect();
         for round in 0..rounds {
-            let index = sample.wrapping_mul(rounds).wrapping_add(round);
             batch.reset(met.len());
             for (k, &i) in met.iter().enumerate() {
-                let (x, y) = pixels[i];
+                let Spot { x, y, sample } = spots[i];
+                let index = sample.wrapping_mul(rounds).wrapping_add(round);
                 let random = PixelRandom::new(x, y, self.settings.seed).spread(index, DIMENSION);
                 let dir = cosine_hemisphere(vertices.at(NORMAL, i), random).to_array().map(S::from_f64);
                 batch.set(k, vertices.leave::<S>(i), dir, zero, length);

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::look::Looks;
+use super::place::{Flat, unit_normal};
 use crate::lanes::chosen::{lanes_of, records};
 use crate::lanes::{MAX_LANES, Real};
 use crate::ray::Hits;
@@ -13,20 +14,34 @@ const MAX_KEPT: u32 = 1 << 20;
 /// Material of those that are not such.
 const OTHER: u32 = u32::MAX;
 
-/// First corner and the edges from it to the second and the third, world space, and the material.
+/// Numbers of a triangle: first corner, the edges from it to the second and the third, unit normal; world space.
+const KEPT: usize = 12;
+/// Those without the normal.
+const EDGES: usize = 9;
+
+/// A triangle and its material.
 #[derive(Clone, Copy, Debug)]
-struct Bare<S> {
-    /// Corner, edge, edge.
-    numbers: [S; 9],
+struct Bare<S, const K: usize> {
+    numbers: [S; K],
     /// Index into the description's materials.
     material: u32,
+}
+
+impl<S: Real> Bare<S, EDGES> {
+    fn with_normal(&self) -> Bare<S, KEPT> {
+        let [.., x1, y1, z1, x2, y2, z2] = self.numbers;
+        let mut numbers = [S::ZERO; KEPT];
+        numbers[..EDGES].copy_from_slice(&self.numbers);
+        numbers[EDGES..].copy_from_slice(&unit_normal([x1, y1, z1], [x2, y2, z2]));
+        Bare { numbers, material: self.material }
+    }
 }
 
 /// Bare triangles by primitive number, where the world is one object of moderate size and there are
 /// rays enough; others are worked out hit by hit.
 #[derive(Debug, Default)]
 pub struct BareTriangles<S> {
-    kept: Vec<Bare<S>>,
+    kept: Vec<Bare<S, KEPT>>,
 }
 
 impl<S: Real> BareTriangles<S> {
@@ -36,12 +51,13 @@ impl<S: Real> BareTriangles<S> {
         if !world.is_single_object() || count > MAX_KEPT || 2 * u64::from(count) > rays {
             return Self { kept: Vec::new() };
         }
-        let other = Bare { numbers: [S::ZERO; 9], material: OTHER };
-        Self { kept: (0..count).into_par_iter().map(|prim| of(world, looks, prim, 0).unwrap_or(other)).collect() }
+        let other = Bare { numbers: [S::ZERO; KEPT], material: OTHER };
+        let kept = |prim| of(world, looks, prim, 0).map_or(other, |bare| bare.with_normal());
+        Self { kept: (0..count).into_par_iter().map(kept).collect() }
     }
 
-    /// Corner and edges of the triangles that the `lanes` of rays `first..first + N` hit, where they are such: these lanes,
-    /// and their materials into `material`.
+    /// The triangles that the `lanes` of rays `first..first + N` hit, where they are such: these lanes, and their materials
+    /// into `material`.
     #[inline(always)]
     pub fn gather(
         &self,
@@ -50,16 +66,18 @@ impl<S: Real> BareTriangles<S> {
         first: usize,
         lanes: u32,
         material: &mut [u32; MAX_LANES],
-    ) -> (u32, [S::Wide; 9]) {
+    ) -> (u32, Flat<S::Wide>) {
         let mut bare = 0;
         if self.kept.is_empty() {
-            let mut own = [[S::ZERO; 9]; MAX_LANES];
+            let mut own = [[S::ZERO; EDGES]; MAX_LANES];
             for lane in lanes_of(lanes) {
                 let Some(found) = of(world, looks, hits.prim[first + lane], hits.inst[first + lane]) else { continue };
                 (own[lane], material[lane]) = (found.numbers, found.material);
                 bare |= 1 << lane;
             }
-            return (bare, records(bare, &NUMBERS, |lane| &own[lane as usize % MAX_LANES]));
+            let numbers: [S::Wide; EDGES] = records(bare, &NUMBERS, |lane| &own[lane as usize % MAX_LANES]);
+            let [corner, e1, e2] = [0, 3, 6].map(|k| [numbers[k], numbers[k + 1], numbers[k + 2]]);
+            return (bare, Flat { corner, edges: [e1, e2], normal: unit_normal(e1, e2) });
         }
         let mut prim = [0; MAX_LANES];
         for lane in lanes_of(lanes) {
@@ -68,7 +86,9 @@ impl<S: Real> BareTriangles<S> {
             material[lane] = own;
             bare |= u32::from(own != OTHER) << lane;
         }
-        (bare, records(bare, &prim, |prim| &self.kept[prim as usize].numbers))
+        let numbers: [S::Wide; KEPT] = records(bare, &prim, |prim| &self.kept[prim as usize].numbers);
+        let [corner, e1, e2, normal] = [0, 3, 6, 9].map(|k| [numbers[k], numbers[k + 1], numbers[k + 2]]);
+        (bare, Flat { corner, edges: [e1, e2], normal })
     }
 }
 
@@ -83,7 +103,7 @@ const NUMBERS: [u32; MAX_LANES] = {
 };
 
 #[inline]
-fn of<S: Real>(world: &World<S>, looks: &Looks<'_>, prim: u32, inst: u32) -> Option<Bare<S>> {
+fn of<S: Real>(world: &World<S>, looks: &Looks<'_>, prim: u32, inst: u32) -> Option<Bare<S, EDGES>> {
     let bare = world.bare_triangle(prim, inst);
     if !looks.is_alike(bare.material) {
         return None;

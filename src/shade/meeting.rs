@@ -60,11 +60,10 @@ impl<S: Real> Meeting<S> {
         let zero = S::Wide::constant(0.0);
         let nowhere = Place { position: [zero; 3], normal: [zero; 3], offset: zero, front: 0 };
         let mut met = Met { place: nowhere, material: [INVALID_ID; MAX_LANES], known: 0 };
-        let (bare, edges) = self.bare.gather((world, looks), hits, first, hit, &mut met.material);
+        let (bare, triangle) = self.bare.gather((world, looks), hits, first, hit, &mut met.material);
         if bare != 0 {
-            let edge = |k: usize| [edges[3 * k], edges[3 * k + 1], edges[3 * k + 2]];
             let [u, v] = [&hits.u, &hits.v].map(|from| S::Wide::load(&from[first..]));
-            met.place = Place::on_triangle([edge(0), edge(1), edge(2)], [u, v, t], dir);
+            met.place = Place::on_triangle(&triangle, [u, v, t], dir);
             // Triangles without area are looked at one by one.
             let square = dot(met.place.normal, met.place.normal);
             met.known = bare & square.cmp_lt(S::Wide::constant(1.5)).bits();

@@ -21,18 +21,34 @@ pub(super) struct Place<V> {
     pub front: u32,
 }
 
+/// Flat triangles, world space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Flat<V> {
+    /// First corner.
+    pub corner: Lanes3<V>,
+    /// Edges from it to the second and the third.
+    pub edges: [Lanes3<V>; 2],
+    /// See [`unit_normal`].
+    pub normal: Lanes3<V>,
+}
+
+/// Unit normal of triangles with these edges; not a number where they have no area.
+#[inline(always)]
+pub(super) fn unit_normal<V: Lanes>(e1: Lanes3<V>, e2: Lanes3<V>) -> Lanes3<V> {
+    // Edges of length about one: products of very small or large ones would leave the range of numbers.
+    let unit = |e: Lanes3<V>| {
+        let rcp = V::constant(1.0) / (e[0].abs() + e[1].abs() + e[2].abs());
+        map3(e, |x| x * rcp)
+    };
+    normalize(cross(unit(e1), unit(e2)))
+}
+
 impl<V: Lanes> Place<V> {
-    /// On triangles, given as a corner and the edges from it to the second and the third, world space, where the rays along
-    /// `dir` meet them with weights `u` and `v` of these corners at `t`.
+    /// On triangles, where the rays along `dir` meet them with weights `u` and `v` of the second and third corner at `t`.
     #[inline(always)]
-    pub fn on_triangle([corner, e1, e2]: [Lanes3<V>; 3], [u, v, t]: [V; 3], dir: Lanes3<V>) -> Self {
+    pub fn on_triangle(triangle: &Flat<V>, [u, v, t]: [V; 3], dir: Lanes3<V>) -> Self {
+        let Flat { corner, edges: [e1, e2], normal } = *triangle;
         let position: Lanes3<V> = each(|i| v.mul_add(e2[i], u.mul_add(e1[i], corner[i])));
-        // Edges of length about one: products of very small or large ones would leave the range of numbers.
-        let unit = |e: Lanes3<V>| {
-            let rcp = V::constant(1.0) / (e[0].abs() + e[1].abs() + e[2].abs());
-            map3(e, |x| x * rcp)
-        };
-        let normal = normalize(cross(unit(e1), unit(e2)));
         // The origin is no further off than the position and the distance together; two more for the position's own.
         let (of_ray, of_triangle) = (gamma::<V>(2.0 * RAY_ROUNDINGS + 2.0), gamma::<V>(TRIANGLE_ROUNDINGS));
         let error = each(|i| {

@@ -4,13 +4,18 @@ use glam::DVec3;
 
 use crate::ray::INVALID_ID;
 
-/// What one primary ray saw. For a miss: infinite distance, invalid ids, zeros, and what the integrator shows there.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+/// The colour that one primary ray saw; nothing by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rgba {
     /// Radiance or the integrator's value, linear Rec.709.
     pub radiance: DVec3,
     /// Whether the radiance is opaque: 1 where something was hit or the integrator shows what lies behind, else 0.
     pub alpha: f64,
+}
+
+/// What else one primary ray saw. For a miss: infinite distance, invalid ids, zeros.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirstHit {
     /// Distance from the ray's origin to the hit, scene units.
     pub distance: f64,
     /// Hit point, world space.
@@ -25,10 +30,6 @@ pub struct Sample {
     pub direct: DVec3,
     /// Material number.
     pub material: u32,
-    /// Of a sum of samples: sum of their squared brightness. Of a pixel: variance of its mean brightness.
-    pub square: f64,
-    /// Of a pixel: number of samples.
-    pub samples: u32,
     /// Instance number.
     pub inst: u32,
     /// Primitive number.
@@ -38,11 +39,9 @@ pub struct Sample {
     pub nodes: f64,
 }
 
-impl Sample {
-    /// A ray that hit nothing in a black world.
-    pub const MISS: Self = Self {
-        radiance: DVec3::ZERO,
-        alpha: 0.0,
+impl FirstHit {
+    /// Of a ray that hit nothing.
+    pub const NONE: Self = Self {
         distance: f64::INFINITY,
         position: DVec3::ZERO,
         normal: DVec3::ZERO,
@@ -50,20 +49,43 @@ impl Sample {
         albedo: DVec3::ZERO,
         direct: DVec3::ZERO,
         material: INVALID_ID,
-        square: 0.0,
-        samples: 0,
         inst: INVALID_ID,
         prim: INVALID_ID,
         nodes: 0.0,
     };
+}
 
-    /// Adds light that a path met after `bounce` scatterings, if it is a number.
-    pub(super) fn shine(&mut self, bounce: u32, light: DVec3) {
+/// What the rays of a primary batch saw, ray by ray. Two lists, as most pictures show colours only.
+#[derive(Clone, Debug, Default)]
+pub struct Samples {
+    /// Colours.
+    pub colors: Vec<Rgba>,
+    /// What else; empty if nothing else was wanted.
+    pub hits: Vec<FirstHit>,
+}
+
+impl Samples {
+    /// Those of `count` rays that saw nothing yet, with or without first hits.
+    pub(super) fn open(&mut self, count: usize, with_hits: bool) {
+        self.colors.clear();
+        self.colors.resize(count, Rgba::default());
+        self.hits.clear();
+        self.hits.resize(if with_hits { count } else { 0 }, FirstHit::NONE);
+    }
+
+    /// Adds light that the path of ray `i` met after `bounce` scatterings, if it is a number.
+    pub(super) fn shine(&mut self, i: usize, bounce: u32, light: DVec3) {
         if light != DVec3::ZERO && light.is_finite() {
-            self.radiance += light;
-            if bounce <= 1 {
-                self.direct += light;
-            }
+            self.add(i, bounce <= 1, light);
+        }
+    }
+
+    /// Adds light to what ray `i` sees, with or without detours.
+    #[inline]
+    pub(super) fn add(&mut self, i: usize, is_direct: bool, light: DVec3) {
+        self.colors[i].radiance += light;
+        if is_direct && let Some(hit) = self.hits.get_mut(i) {
+            hit.direct += light;
         }
     }
 }

@@ -11,13 +11,13 @@ use super::look::Looks;
 use super::meeting::Meeting;
 use super::path::{PathMemory, Paths};
 use super::rt::Rt;
-use super::sample::{RayCounts, Sample};
+use super::sample::{FirstHit, RayCounts, Samples};
+use super::spot::{Draw, Spot};
 use super::stats::{Clock, PathStats};
-use super::through::{Again, Through, number};
+use super::through::{Again, Through};
 use super::vertices::Vertices;
 use super::whitted;
 use crate::camera::Camera;
-use crate::camera::sobol::PixelPoints;
 use crate::lanes::Real;
 use crate::ray::{Counters, Hits, Rays};
 use crate::scene::description::{Description, Light};
@@ -27,6 +27,10 @@ use crate::trace::{Engine, Scratch};
 
 /// Rays of one cost measurement: in Morton order 16 consecutive rays are a block of 4 x 4 pixels.
 const COST_BLOCK: usize = 16;
+
+/// Samples of a tile whose paths are traced together. With tiles of 32 x 32 pixels that is some hundred bytes times
+/// 8192, which still fits a core's second cache.
+const PASSES: u32 = 8;
 
 /// What an integrator may vary.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +45,7 @@ pub struct Settings {
     pub ao_radius: f64,
     /// Seed of the random numbers.
     pub seed: u64,
-    /// Whether node visits of primary rays are counted (see [`Sample::nodes`]).
+    /// Whether node visits of primary rays are counted (see [`FirstHit::nodes`]).
     pub cost: bool,
     /// Whether more is wanted of first hits than radiance and coverage (where it is not, the work is saved).
     pub first_hits: bool,
@@ -168,24 +172,18 @@ impl<'a, S: Real> Shader<'a, S> {
         self
     }
 
-    /// What each ray of the primary batch `rays` sees, into `out` (made as long as the batch). Ray `i` belongs to
-    /// pixel `pixels[i]` and is that pixel's sample number `sample`. Dead rays give [`Sample::MISS`]. Where no first hits
-    /// are wanted, only radiance and coverage mean something.
-    pub fn shade(
-        &self,
-        rays: &Rays<S>,
-        pixels: &[(u32, u32)],
-        sample: u32,
-        work: &mut Workspace<S>,
-        out: &mut Vec<Sample>,
-    ) {
+    /// Samples of each pixel of a tile that are best shaded as one batch, after `done` of them: paths part, and the more of
+    /// them there are, the more go the same way. No more than `done`, so that batches are the same where a picture is
+    /// looked at whenever its samples have doubled: with some engines hits depend on the batch.
+    pub fn passes(&self, done: u32) -> u32 {
+        if self.paths.is_some() { done.clamp(1, PASSES) } else { 1 }
+    }
+
+    /// What each ray of the primary batch `rays` sees, into `out` (made as long as the batch). Ray `i` is sample
+    /// `spots[i]`. Dead rays see nothing.
+    pub fn shade(&self, rays: &Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut Samples) {
         let shows_hits = self.settings.first_hits || self.settings.cost || self.settings.integrator.shows_hits();
-        if shows_hits || out.len() != rays.len() {
-            out.clear();
-            out.resize(rays.len(), Sample::MISS);
-        } else {
-            out.iter_mut().for_each(|sample| (sample.radiance, sample.alpha) = (DVec3::ZERO, 0.0));
-        }
+        out.open(rays.len(), shows_hits);
         work.clock.start(&work.rays);
         work.rays.primary += rays.live_count() as u64;
         if let (Integrator::Rt, Some(rt)) = (self.settings.integrator, &self.rt) {
@@ -193,27 +191,27 @@ impl<'a, S: Real> Shader<'a, S> {
             return work.lap(0);
         }
         if let Some(paths) = &self.paths {
-            return paths.shade(rays, pixels, sample, work, out);
+            return paths.shade(rays, spots, work, out);
         }
         if self.settings.cost {
             let clock = Instant::now();
-            self.trace_blocks(rays, work, out);
+            self.trace_blocks(rays, work, &mut out.hits);
             work.clock.tracing += clock.elapsed();
         } else {
-            self.intersect(rays, work, |i, layer| self.number(pixels[i], sample, 0, layer));
+            self.intersect(rays, work, |i, layer| self.draw(spots[i]).number(0, layer));
         }
         for i in (0..rays.len()).filter(|i| work.hits.is_hit(*i)) {
-            out[i].alpha = 1.0;
-            if shows_hits {
-                self.show(rays, &work.hits, i, &mut out[i]);
+            out.colors[i].alpha = 1.0;
+            if let Some(seen) = out.hits.get_mut(i) {
+                self.show(rays, &work.hits, i, seen);
             }
         }
         match self.settings.integrator {
             // Without regions to look at, `rt`'s model has nothing to say.
-            Integrator::Whitted | Integrator::Rt | Integrator::Path => self.whitted(rays, pixels, sample, work, out),
+            Integrator::Whitted | Integrator::Rt | Integrator::Path => self.whitted(rays, spots, work, &mut out.colors),
             view => {
                 match view {
-                    Integrator::Ao => self.ambient_occlusion(rays, pixels, sample, work, out),
+                    Integrator::Ao => self.ambient_occlusion(rays, spots, work, &mut out.colors),
                     Integrator::Normals => super::views::normals(out),
                     Integrator::Depth => super::views::depth(out),
                     _ => super::views::cost(out),
@@ -243,28 +241,21 @@ impl<'a, S: Real> Shader<'a, S> {
 
     /// Calls `lit` with the number of each of `rays` that is not occluded, and the share of its light that arrives; `glass`
     /// lets light pass through it.
-    pub(super) fn occlude(
-        &self,
-        rays: &Rays<S>,
-        work: &mut Workspace<S>,
-        glass: bool,
-        mut lit: impl FnMut(usize, DVec3),
-    ) {
+    pub(super) fn occlude(&self, rays: &Rays<S>, work: &mut Workspace<S>, glass: bool, lit: impl FnMut(usize, DVec3)) {
         let clock = Instant::now();
         let counters = self.settings.count.then_some(&mut work.counters);
         let (hits, occluded, scratch) = (&mut work.hits, &mut work.occluded, &mut work.scratch);
-        let left = self.through().shadows(rays, hits, occluded, scratch, &mut work.again, glass, counters);
+        self.through().shadows(rays, hits, occluded, scratch, &mut work.again, glass, counters, lit);
         work.clock.shadowing += clock.elapsed();
-        left.iter().enumerate().filter(|(_, left)| **left != DVec3::ZERO).for_each(|(i, left)| lit(i, *left));
     }
 
     fn through(&self) -> Through<'_, S> {
         Through { world: self.world, engine: self.engine, looks: &self.looks }
     }
 
-    /// A number in [0, 1) of a pixel's sample and level, by name.
-    pub(super) fn number(&self, (x, y): (u32, u32), sample: u32, level: u32, name: u32) -> f64 {
-        number(PixelPoints::new(x, y, self.settings.seed), sample, level, name)
+    /// The random numbers of a sample.
+    pub(super) fn draw(&self, spot: Spot) -> Draw {
+        Draw::new(spot, self.settings.seed)
     }
 
     /// Radiance of a ray that leaves the scene along `dir`.
@@ -274,7 +265,7 @@ impl<'a, S: Real> Shader<'a, S> {
 
     /// As [`Self::intersect`], 16 rays at a time with counting kernels, which gives each block of 4 x 4 pixels its
     /// own number of node visits.
-    fn trace_blocks(&self, rays: &Rays<S>, work: &mut Workspace<S>, out: &mut [Sample]) {
+    fn trace_blocks(&self, rays: &Rays<S>, work: &mut Workspace<S>, out: &mut [FirstHit]) {
         work.hits.reset(rays.len());
         for first in (0..rays.len()).step_by(COST_BLOCK) {
             let count = COST_BLOCK.min(rays.len() - first);
@@ -298,7 +289,7 @@ impl<'a, S: Real> Shader<'a, S> {
     }
 
     /// What pictures show of the first hit of ray `i`, besides radiance.
-    fn show(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize, seen: &mut Sample) {
+    fn show(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize, seen: &mut FirstHit) {
         let [org, dir] = [rays.org(i), rays.dir(i)].map(|v| DVec3::from(v.map(S::to_f64)));
         let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
         let surface = self.world.surface(org, dir, t, u, v, hits.prim[i], hits.inst[i]);

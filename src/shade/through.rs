@@ -5,8 +5,6 @@ use glam::DVec3;
 
 use super::classic::Classic;
 use super::look::Looks;
-use crate::camera::sampling::pcg4d;
-use crate::camera::sobol::PixelPoints;
 use crate::lanes::Real;
 use crate::ray::{Counters, Hits, INVALID_ID, Rays};
 use crate::scene::world::World;
@@ -16,12 +14,6 @@ use crate::trace::{Engine, Scratch};
 const MOST_LAYERS: u32 = 1024;
 /// Name of the number that chooses in mixtures; layers that a ray meets are named by their number.
 pub(super) const MIXTURE: u32 = u32::MAX;
-
-/// A number in [0, 1) of a pixel's sample and bounce, by name.
-pub(super) fn number(pixel: PixelPoints, sample: u32, bounce: u32, name: u32) -> f64 {
-    let [bits, ..] = pcg4d([pixel.bits(0, u32::MAX)[0], sample, bounce, name]);
-    f64::from(bits) / 4_294_967_296.0
-}
 
 /// A tracer of rays that pass some surfaces.
 #[derive(Clone, Copy)]
@@ -81,14 +73,35 @@ impl<S: Real> Through<'_, S> {
         }
     }
 
-    /// What of the light along each of `rays` is left, as a list: 0 behind an opaque surface, 1 without any in
-    /// between. With `glass`, panes and bodies of glass let light pass straight on, weakened by their tint and
+    /// Calls `lit` with the number of each of `rays` along which some light is left, and its share: 1 without any surface
+    /// in between. With `glass`, panes and bodies of glass let light pass straight on, weakened by their tint and
     /// Fresnel's term; else they stop it.
-    pub fn shadows<'m>(
+    #[inline]
+    pub fn shadows(
         &self,
         rays: &Rays<S>,
         hits: &mut Hits<S>,
         occluded: &mut Vec<u8>,
+        scratch: &mut Scratch,
+        again: &mut Again<S>,
+        glass: bool,
+        counters: Option<&mut Counters>,
+        mut lit: impl FnMut(usize, DVec3),
+    ) {
+        if !(self.looks.has_holes || glass && self.looks.has_glass) {
+            self.engine.occluded(self.world, rays, occluded, scratch, counters);
+            occluded.iter().enumerate().filter(|(_, occluded)| **occluded == 0).for_each(|(i, _)| lit(i, DVec3::ONE));
+            return;
+        }
+        let left = self.weakened(rays, hits, scratch, again, glass, counters);
+        left.iter().enumerate().filter(|(_, left)| **left != DVec3::ZERO).for_each(|(i, left)| lit(i, *left));
+    }
+
+    /// What of the light along each of `rays` is left, as a list.
+    fn weakened<'m>(
+        &self,
+        rays: &Rays<S>,
+        hits: &mut Hits<S>,
         scratch: &mut Scratch,
         again: &'m mut Again<S>,
         glass: bool,
@@ -96,11 +109,6 @@ impl<S: Real> Through<'_, S> {
     ) -> &'m [DVec3] {
         let Again { rays: behind, hits: found, index, left } = again;
         left.clear();
-        if !(self.looks.has_holes || glass && self.looks.has_glass) {
-            self.engine.occluded(self.world, rays, occluded, scratch, counters);
-            left.extend(occluded.iter().map(|&o| DVec3::splat(f64::from(1 - o.min(1)))));
-            return left;
-        }
         left.resize(rays.len(), DVec3::ONE);
         self.engine.intersect(self.world, rays, hits, scratch, counters.as_deref_mut());
         index.clear();

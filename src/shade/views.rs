@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::sample::Sample;
+use super::sample::{FirstHit, Rgba, Samples};
 
 /// Heat of a cost, from cold to hot; linear Rec.709, brighter is dearer.
 const HEAT: [DVec3; 5] = [
@@ -16,24 +16,26 @@ const HEAT: [DVec3; 5] = [
 const HOTTEST_LOG2: f64 = 6.0;
 
 /// Normals n as 0.5 + 0.5 n; misses black.
-pub(super) fn normals(out: &mut [Sample]) {
-    for sample in out.iter_mut().filter(|s| s.alpha > 0.0) {
-        sample.radiance = 0.5 + 0.5 * sample.normal;
-    }
+pub(super) fn normals(out: &mut Samples) {
+    show(out, |hit| 0.5 + 0.5 * hit.normal);
 }
 
 /// Distances; misses 0.
-pub(super) fn depth(out: &mut [Sample]) {
-    for sample in out.iter_mut().filter(|s| s.alpha > 0.0) {
-        sample.radiance = DVec3::splat(sample.distance);
+pub(super) fn depth(out: &mut Samples) {
+    show(out, |hit| DVec3::splat(hit.distance));
+}
+
+/// Shows `value` of what was hit.
+fn show(out: &mut Samples, value: impl Fn(&FirstHit) -> DVec3) {
+    for (color, hit) in out.colors.iter_mut().zip(&out.hits).filter(|(color, _)| color.alpha > 0.0) {
+        color.radiance = value(hit);
     }
 }
 
 /// Node visits as heat, also of misses, on a fixed logarithmic scale so that two pictures can be compared.
-pub(super) fn cost(out: &mut [Sample]) {
-    for sample in out {
-        sample.radiance = heat((1.0 + sample.nodes).log2() / HOTTEST_LOG2);
-        sample.alpha = 1.0;
+pub(super) fn cost(out: &mut Samples) {
+    for (color, hit) in out.colors.iter_mut().zip(&out.hits) {
+        *color = Rgba { radiance: heat((1.0 + hit.nodes).log2() / HOTTEST_LOG2), alpha: 1.0 };
     }
 }
 
@@ -49,20 +51,23 @@ mod tests {
 
     #[test]
     fn first_hit_views_by_hand() {
-        let hit = Sample { alpha: 1.0, distance: 2.5, normal: -DVec3::Z, ..Sample::MISS };
-        let mut out = [hit, Sample::MISS];
+        let hit = FirstHit { distance: 2.5, normal: -DVec3::Z, ..FirstHit::NONE };
+        let opaque = Rgba { alpha: 1.0, ..Rgba::default() };
+        let mut out = Samples { colors: vec![opaque, Rgba::default()], hits: vec![hit, FirstHit::NONE] };
+        let colors = |out: &Samples| [out.colors[0].radiance, out.colors[1].radiance];
         normals(&mut out);
-        assert_eq!(out.map(|s| s.radiance), [DVec3::new(0.5, 0.5, 0.0), DVec3::ZERO]);
+        assert_eq!(colors(&out), [DVec3::new(0.5, 0.5, 0.0), DVec3::ZERO]);
         depth(&mut out);
-        assert_eq!(out.map(|s| s.radiance), [DVec3::splat(2.5), DVec3::ZERO]);
+        assert_eq!(colors(&out), [DVec3::splat(2.5), DVec3::ZERO]);
     }
 
     #[test]
     fn dearer_is_brighter() {
-        let mut out: Vec<Sample> =
-            [0.0, 1.0, 7.0, 30.0, 63.0, 1e9].map(|nodes| Sample { nodes, ..Sample::MISS }).to_vec();
+        let hits: Vec<_> = [0.0, 1.0, 7.0, 30.0, 63.0, 1e9].map(|nodes| FirstHit { nodes, ..FirstHit::NONE }).into();
+        let mut out = Samples { colors: vec![Rgba::default(); hits.len()], hits };
         cost(&mut out);
-        let luminance = |s: &Sample| s.radiance.dot(DVec3::new(0.2126, 0.7152, 0.0722));
+        let out = out.colors;
+        let luminance = |s: &Rgba| s.radiance.dot(DVec3::new(0.2126, 0.7152, 0.0722));
         assert!(out.windows(2).all(|w| luminance(&w[0]) <= luminance(&w[1])));
         assert_eq!(out[2].radiance, HEAT[2], "log2(8) is the middle of 0 to 6");
         assert_eq!((out[4].radiance, out[5].radiance), (DVec3::ONE, DVec3::ONE));

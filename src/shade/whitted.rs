@@ -7,8 +7,9 @@ use glam::DVec3;
 use super::branches::Branches;
 use super::classic::refracted;
 use super::lights::Lamp;
-use super::sample::Sample;
+use super::sample::Rgba;
 use super::shader::{Shader, Workspace};
+use super::spot::Spot;
 use super::vertices::{AMBIENT, DIFFUSE, EMISSION, ETA, MIRROR, NORMAL, POSITION, SHADING, THROUGH, Vertices};
 use crate::lanes::chosen::{at, lanes_of, spill};
 use crate::lanes::space::{add, choose, scale, times};
@@ -40,14 +41,7 @@ impl<S: Real> Shader<'_, S> {
     /// scene sees the background. Light passes glass straight on its way from a light.
     ///
     /// `work.hits` are the hits of `rays`. A sample's terms are added level by level and light by light.
-    pub(super) fn whitted(
-        &self,
-        rays: &Rays<S>,
-        pixels: &[(u32, u32)],
-        sample: u32,
-        work: &mut Workspace<S>,
-        out: &mut [Sample],
-    ) {
+    pub(super) fn whitted(&self, rays: &Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut [Rgba]) {
         for i in 0..rays.len() {
             if !work.hits.is_hit(i) && rays.is_live(i) {
                 let behind = self.beyond(DVec3::from(rays.dir(i).map(S::to_f64)));
@@ -78,9 +72,7 @@ impl<S: Real> Shader<'_, S> {
             if now.len() == 0 {
                 break;
             }
-            self.intersect(&now.rays, work, |i, layer| {
-                self.number(pixels[now.path[i] as usize], sample, level + 1, layer)
-            });
+            self.intersect(&now.rays, work, |i, layer| self.draw(spots[now.path[i] as usize]).number(level + 1, layer));
             for i in (0..now.len()).filter(|i| !work.hits.is_hit(*i)) {
                 let behind = self.beyond(DVec3::from(now.rays.dir(i).map(S::to_f64)));
                 out[now.path[i] as usize].radiance += now.weight_of(i) * behind;
@@ -90,7 +82,7 @@ impl<S: Real> Shader<'_, S> {
     }
 
     /// Adds what points show without any light's help.
-    fn add_unlit(&self, level: &Level<'_, S>, out: &mut [Sample]) {
+    fn add_unlit(&self, level: &Level<'_, S>, out: &mut [Rgba]) {
         let Level { carried, vertices, .. } = level;
         let ambient = self.ambient.to_array().map(S::Wide::constant);
         for (first, lanes) in vertices.packets() {
@@ -118,7 +110,7 @@ impl<S: Real> Shader<'_, S> {
         level: &Level<'_, S>,
         shadows: &mut Branches<S>,
         work: &mut Workspace<S>,
-        out: &mut [Sample],
+        out: &mut [Rgba],
     ) {
         let Level { rays, carried, vertices } = level;
         let lamp = Lamp::<S::Wide>::new(light);

@@ -97,8 +97,8 @@ mod tests {
     use glam::DVec3;
 
     use super::super::super::patch::{channels, empty_film};
+    use super::super::super::pixels::Pixel;
     use super::*;
-    use crate::shade::Sample;
 
     #[test]
     fn the_smallest_block_with_a_colour_is_shown() {
@@ -107,7 +107,8 @@ mod tests {
         let mut frame = Framebuffer::new(empty_film((20, 20), window, &channels), 8);
         let mut patch = Patch::default();
         let mut put = |frame: &mut Framebuffer, pixel, value| {
-            let gray = Sample { radiance: DVec3::splat(value), ..Sample::MISS };
+            let mut gray = Pixel::EMPTY;
+            gray.color.radiance = DVec3::splat(value);
             patch.fill(&channels, window, &[pixel], &[gray]);
             frame.paint(&patch);
         };

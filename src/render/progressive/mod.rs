@@ -12,7 +12,6 @@
 
 mod framebuffer;
 mod steps;
-mod sums;
 
 use std::mem::take;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,22 +24,22 @@ pub use framebuffer::Framebuffer;
 pub use steps::{LARGEST_BLOCK, Step};
 
 use super::aov::{Aov, Channel};
+use super::canvas::{Canvas, Memory};
 use super::options::{Progress, RenderOptions, rect_of};
-use super::patch::{Patch, channels, empty_film};
-use super::pixels::{begin, mean};
+use super::patch::{channels, empty_film};
+use super::pixels::Pixel;
 use super::scheduler::RenderOutput;
+use super::sums::Sums;
 use super::tally::Tally;
-use crate::camera::{Camera, PixelRect, Tiling, fill_pixels, fill_tile, morton_decode};
+use crate::camera::{Camera, Tiling};
 use crate::error::{Error, Result, locked};
 use crate::film::Window;
 use crate::lanes::Real;
-use crate::ray::Rays;
 use crate::scene::description::Description;
 use crate::scene::world::World;
-use crate::shade::{Sample, Shader, Workspace, headlight};
+use crate::shade::{Samples, Shader, headlight};
 use crate::trace::Engine;
 use steps::{Lattice, check_start, plan};
-use sums::Sums;
 
 /// Who looks at a picture in the making; called from all threads.
 pub trait Viewer: Sync {
@@ -58,11 +57,8 @@ impl Viewer for () {
 /// A picture in the making. It can be stopped between batches at any time, looked at, and continued.
 pub struct Progressive<'a, S: Real> {
     shader: Shader<'a, S>,
-    camera: &'a Camera,
-    options: &'a RenderOptions,
-    tiling: Tiling,
+    canvas: Canvas<'a>,
     window: Window,
-    rect: PixelRect,
     start: u32,
     /// Tiles of the window, and what is known of each.
     tiles: Vec<(u32, Mutex<Tile>)>,
@@ -83,22 +79,6 @@ struct Tile {
     samples: u32,
     /// Their sums, in Morton order.
     sums: Sums,
-}
-
-/// One thread's arrays.
-struct Memory<S> {
-    rays: Rays<S>,
-    work: Workspace<S>,
-    pixels: Vec<(u32, u32)>,
-    samples: Vec<Sample>,
-    patch: Patch,
-}
-
-impl<S: Real> Default for Memory<S> {
-    fn default() -> Self {
-        let (rays, work) = (Rays::new(0), Workspace::default());
-        Self { rays, work, pixels: Vec::new(), samples: Vec::new(), patch: Patch::default() }
-    }
 }
 
 /// Arrays lent to a thread for a step. Threads come and go with each piece of work that is split off; memory that was never
@@ -159,8 +139,8 @@ impl<'a, S: Real> Progressive<'a, S> {
         let shader = Shader::new(world, description, engine, headlight(camera), settings).with_rt(description, camera);
         let rect = rect_of(window);
         let first = u32::from(start > 1);
-        let only_color = options.aovs.is_empty();
-        let tile = |number| (number, Mutex::new(Tile { samples: first, sums: Sums::new(only_color) }));
+        let with_hits = !options.aovs.is_empty();
+        let tile = |number| (number, Mutex::new(Tile { samples: first, sums: Sums::new(with_hits) }));
         let tiles: Vec<_> = tiling.tiles_in(rect).into_iter().map(tile).collect();
         let batches = |step: &Step| match *step {
             Step::Blocks(block) => u64::from(lattice(window, &tiling, block, start).batches_with_pixels()),
@@ -170,11 +150,8 @@ impl<'a, S: Real> Progressive<'a, S> {
         let frame = Mutex::new(Framebuffer::new(film, start));
         Ok(Self {
             shader,
-            camera,
-            options,
-            tiling,
+            canvas: Canvas { camera, options, tiling, rect },
             window,
-            rect,
             start,
             tiles,
             channels,
@@ -193,7 +170,7 @@ impl<'a, S: Real> Progressive<'a, S> {
         let clock = Instant::now();
         let watch = Watch { progress, viewer, total: self.total };
         let mut finished = true;
-        for step in plan(self.start, self.options.spp) {
+        for step in plan(self.start, self.canvas.options.spp) {
             let stopped = AtomicBool::new(false);
             let tally = match step {
                 Step::Blocks(block) => self.blocks(block, watch, &stopped),
@@ -231,7 +208,7 @@ impl<'a, S: Real> Progressive<'a, S> {
 
     /// One ray for each block that has none.
     fn blocks(&self, block: u32, watch: Watch<'_>, stopped: &AtomicBool) -> Tally {
-        let lattice = lattice(self.window, &self.tiling, block, self.start);
+        let lattice = lattice(self.window, &self.canvas.tiling, block, self.start);
         let one = |lent: &mut Lent<'_, S>, batch: u32| {
             let memory = &mut lent.memory;
             memory.pixels.clear();
@@ -243,17 +220,12 @@ impl<'a, S: Real> Progressive<'a, S> {
             if memory.pixels.is_empty() || stop(watch, stopped) {
                 return Tally::default();
             }
-            let size = (self.options.width, self.options.height);
-            fill_pixels(self.camera, size, &memory.pixels, self.options.sub_pixel(0), &mut memory.rays);
-            self.shader.shade(&memory.rays, &memory.pixels, 0, &mut memory.work, &mut memory.samples);
-            if self.options.spp > 1 {
+            self.canvas.shade_pixels(&self.shader, memory);
+            if self.canvas.options.spp > 1 {
                 self.keep_first(&memory.pixels, &memory.samples);
             }
-            for sample in &mut memory.samples {
-                begin(sample);
-                *sample = mean(sample, 1);
-            }
-            memory.patch.fill(&self.channels, self.window, &memory.pixels, &memory.samples);
+            let pixels: Vec<_> = (0..memory.pixels.len()).map(|ray| Pixel::of_one(&memory.samples, ray)).collect();
+            memory.patch.fill(&self.channels, self.window, &memory.pixels, &pixels);
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
             self.told(watch, frame, lattice.part(batch), memory)
@@ -263,12 +235,12 @@ impl<'a, S: Real> Progressive<'a, S> {
     }
 
     /// Keeps the first samples of pixels for those to come.
-    fn keep_first(&self, pixels: &[(u32, u32)], samples: &[Sample]) {
-        let per_tile = self.tiling.rays_per_tile();
+    fn keep_first(&self, pixels: &[(u32, u32)], samples: &Samples) {
+        let per_tile = self.canvas.tiling.rays_per_tile();
         // The lock of a tile is kept while its pixels come: with small blocks they come together.
         let mut held: Option<(u32, MutexGuard<'_, Tile>)> = None;
-        for (&(x, y), sample) in pixels.iter().zip(samples) {
-            let index = self.tiling.index(x, y);
+        for (ray, &(x, y)) in pixels.iter().enumerate() {
+            let index = self.canvas.tiling.index(x, y);
             let number = (index / u64::from(per_tile)) as u32;
             if held.as_ref().is_none_or(|(held, _)| *held != number) {
                 drop(held.take());
@@ -277,7 +249,7 @@ impl<'a, S: Real> Progressive<'a, S> {
             }
             if let Some((_, tile)) = &mut held {
                 tile.sums.make_room(per_tile as usize);
-                tile.sums.add((index % u64::from(per_tile)) as usize, sample);
+                tile.sums.add((index % u64::from(per_tile)) as usize, samples, ray);
             }
         }
     }
@@ -290,31 +262,25 @@ impl<'a, S: Real> Progressive<'a, S> {
             if tile.samples >= samples {
                 return Tally::default();
             }
-            let count = self.tiling.rays_per_tile();
-            let (x0, y0) = self.tiling.origin(*number);
-            memory.pixels.clear();
-            memory.pixels.extend((0..count).map(morton_decode).map(|(dx, dy)| (x0 + dx, y0 + dy)));
-            tile.sums.make_room(count as usize);
+            self.canvas.list_pixels(*number, memory);
+            tile.sums.make_room(memory.pixels.len());
             while tile.samples < samples {
                 if stop(watch, stopped) {
                     return Tally::take(&mut memory.work, 0);
                 }
-                let sub_pixel = self.options.sub_pixel(tile.samples);
-                fill_tile(self.camera, &self.tiling, *number, self.rect, sub_pixel, &mut memory.rays);
-                let Memory { rays, work, pixels, samples: seen, .. } = memory;
-                self.shader.shade(rays, pixels, tile.samples, work, seen);
-                tile.sums.add_all(seen);
-                tile.samples += 1;
+                let numbers = tile.samples..samples.min(tile.samples + self.shader.passes(tile.samples));
+                let passes = self.canvas.shade(&self.shader, *number, numbers, memory);
+                tile.sums.add_passes(passes, &memory.samples);
+                tile.samples += passes.count();
             }
-            memory.samples.clear();
-            memory.samples.extend((0..memory.pixels.len()).map(|pixel| mean(&tile.sums.of(pixel), samples)));
-            memory.patch.fill(&self.channels, self.window, &memory.pixels, &memory.samples);
+            let pixels: Vec<_> = tile.sums.pixels(samples).collect();
+            memory.patch.fill(&self.channels, self.window, &memory.pixels, &pixels);
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
-            if samples == self.options.spp {
+            if samples == self.canvas.options.spp {
                 tile.sums.free();
             }
-            let edge = self.tiling.edge();
+            let (edge, (x0, y0)) = (self.canvas.tiling.edge(), self.canvas.tiling.origin(*number));
             let (x1, y1) = ((x0 + edge).min(self.window.x1), (y0 + edge).min(self.window.y1));
             let part = Window { x0: x0.max(self.window.x0), y0: y0.max(self.window.y0), x1, y1 };
             self.told(watch, frame, part, memory)

@@ -7,7 +7,7 @@ use crate::lanes::Real;
 use crate::ray::Hits;
 use crate::scene::world::Surface;
 use crate::shade::look::Look;
-use crate::shade::sample::Sample;
+use crate::shade::sample::FirstHit;
 
 /// A surface, and whether it is seen from the side of its normal.
 pub struct Seen<'w> {
@@ -37,7 +37,7 @@ impl<'w> Seen<'w> {
 
 impl Arrival<'_> {
     /// What pictures show of the first hit, besides radiance.
-    pub fn show<S: Real>(&self, i: usize, dir: DVec3, hits: &Hits<S>, seen: &mut Sample) {
+    pub fn show<S: Real>(&self, i: usize, dir: DVec3, hits: &Hits<S>, seen: &mut FirstHit) {
         seen.distance = hits.t[i].to_f64() * dir.length();
         seen.position = self.surface.position;
         (seen.normal, seen.shading_normal) = (self.ng, self.ns);

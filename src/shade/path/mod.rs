@@ -43,11 +43,11 @@ use self::wave::{Shadows, Wave};
 use super::look::{Looks, Model};
 use super::meeting::{Meeting, Met, met_lanes};
 use super::offset::position_error;
-use super::sample::Sample;
+use super::sample::Samples;
 use super::shader::{Settings, Workspace};
+use super::spot::{Draw, Spot};
 use super::stats::BounceStats;
-use super::through::{Again, MIXTURE, Through, number};
-use crate::camera::sobol::PixelPoints;
+use super::through::{Again, MIXTURE, Through};
 use crate::lanes::chosen::{Chosen, at, lanes_of, spill};
 use crate::lanes::{Lanes, MAX_LANES, Real, each};
 use crate::ray::{Hits, Rays};
@@ -69,8 +69,6 @@ pub(super) struct Paths<'a, S: Real> {
     /// Scatterings of a path at most.
     depth: u32,
     seed: u64,
-    /// Whether properties of first hits are wanted besides radiance.
-    first_hits: bool,
     shadow_end: S,
     meeting: Meeting<S>,
     /// What the sides of materials scatter with, as [`Looks::sides`] lists them.
@@ -84,7 +82,7 @@ pub(super) struct PathMemory<S> {
     places: Places<S>,
     /// What points of textured materials scatter with, numbered after the sides.
     looks: Vec<LookNumbers<S>>,
-    pixels: Vec<PixelPoints>,
+    draws: Vec<Draw>,
     now: Wave<S>,
     next: Wave<S>,
     shadows: Shadows<S>,
@@ -97,7 +95,7 @@ impl<S: Real> Default for PathMemory<S> {
             points: std::array::from_fn(|_| Points::default()),
             places: Places::default(),
             looks: Vec::new(),
-            pixels: Vec::new(),
+            draws: Vec::new(),
             now: Wave::default(),
             next: Wave::default(),
             shadows: Shadows::default(),
@@ -120,61 +118,47 @@ impl<'a, S: Real> Paths<'a, S> {
         let is_of_all_widths = |m: &Material| matches!(m.scattering, Scattering::MetallicRoughness { .. });
         let facets = FacetsList::new(&looks.rough, description.materials.iter().any(is_of_all_widths));
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
-        let Settings { depth, seed, first_hits, .. } = *settings;
+        let Settings { depth, seed, .. } = *settings;
         let meeting = Meeting::new(world, &looks, settings.rays);
         let sides = looks.sides().map(|look| look_numbers(look.base, &look.param)).collect();
-        Self { world, engine, looks, lights, facets, depth, seed, first_hits, shadow_end, meeting, sides }
+        Self { world, engine, looks, lights, facets, depth, seed, shadow_end, meeting, sides }
     }
 
     /// The radiance along each ray of the primary batch `rays` into `out`, which holds misses; see
     /// [`super::Shader::shade`].
-    pub fn shade(
-        &self,
-        rays: &Rays<S>,
-        pixels: &[(u32, u32)],
-        sample: u32,
-        work: &mut Workspace<S>,
-        out: &mut [Sample],
-    ) {
+    pub fn shade(&self, rays: &Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut Samples) {
         let mut memory = std::mem::take(&mut work.paths);
-        memory.pixels.clear();
-        memory.pixels.extend(pixels.iter().map(|&(x, y)| PixelPoints::new(x, y, self.seed)));
+        memory.draws.clear();
+        memory.draws.extend(spots.iter().map(|spot| Draw::new(*spot, self.seed)));
         memory.start(rays);
         for bounce in 0..=self.depth {
             if memory.now.path.is_empty() {
                 break;
             }
-            self.bounce(bounce, sample, &mut memory, work, out);
+            self.bounce(bounce, &mut memory, work, out);
             std::mem::swap(&mut memory.now, &mut memory.next);
         }
         work.paths = memory;
     }
 
     /// Traces the wave `memory.now`, and scatters what it hits into `memory.next`.
-    fn bounce(
-        &self,
-        bounce: u32,
-        sample: u32,
-        memory: &mut PathMemory<S>,
-        work: &mut Workspace<S>,
-        out: &mut [Sample],
-    ) {
+    fn bounce(&self, bounce: u32, memory: &mut PathMemory<S>, work: &mut Workspace<S>, out: &mut Samples) {
         let live = memory.now.path.len() as u64;
         let clock = Instant::now();
         let through = Through { world: self.world, engine: self.engine, looks: &self.looks };
-        let (pixels, paths) = (&memory.pixels, &memory.now.path);
+        let (draws, paths) = (&memory.draws, &memory.now.path);
         through.closest(&memory.now.rays, &mut work.hits, &mut work.scratch, &mut memory.again, None, |i, layer| {
-            number(pixels[paths[i] as usize], sample, bounce, layer)
+            draws[paths[i] as usize].number(bounce, layer)
         });
         let traced = clock.elapsed();
-        self.arrive_all(bounce, sample, memory, &work.hits, out);
+        self.arrive_all(bounce, memory, &work.hits, out);
         let mut stats = BounceStats { rays: live, tracing: traced, ..BounceStats::default() };
         let count: usize = memory.points.iter().map(Points::len).sum();
         stats.points = count as u64;
         memory.next.open(count);
         memory.shadows.open(count);
         if bounce < self.depth {
-            stats.lanes = self.scatter_all(bounce, sample, memory);
+            stats.lanes = self.scatter_all(bounce, memory);
         }
         memory.next.close();
         memory.shadows.close();
@@ -186,22 +170,17 @@ impl<'a, S: Real> Paths<'a, S> {
         work.rays.scattered += if bounce == 0 { 0 } else { live };
         let shadows = &memory.shadows;
         let (hits, occluded, scratch) = (&mut work.hits, &mut work.occluded, &mut work.scratch);
-        let left = through.shadows(&shadows.rays, hits, occluded, scratch, &mut memory.again, false, None);
-        for (i, (&path, &left)) in shadows.path.iter().zip(left).enumerate() {
+        through.shadows(&shadows.rays, hits, occluded, scratch, &mut memory.again, false, None, |i, left| {
             let light = DVec3::from(each(|axis| shadows.light[axis][i].to_f64())) * left;
-            let seen = &mut out[path as usize];
-            seen.radiance += light;
-            if bounce == 0 {
-                seen.direct += light;
-            }
-        }
+            out.add(shadows.path[i] as usize, bounce == 0, light);
+        });
         stats.shadowing = clock.elapsed();
         work.stats.add(bounce, &stats);
     }
 
     /// Every model's points in packets; lanes in all packets.
-    fn scatter_all(&self, bounce: u32, sample: u32, memory: &mut PathMemory<S>) -> u64 {
-        let chances = Chances { points: &memory.pixels, sample, bounce };
+    fn scatter_all(&self, bounce: u32, memory: &mut PathMemory<S>) -> u64 {
+        let chances = Chances { draws: &memory.draws, bounce };
         let (next, shadows) = (&mut memory.next, &mut memory.shadows);
         let looks = [&self.sides[..], &memory.looks];
         let arrivals = Arrivals { wave: &memory.now, places: &memory.places, looks };
@@ -236,7 +215,7 @@ impl<'a, S: Real> Paths<'a, S> {
     }
 
     /// The rays of the wave have arrived: adds what shines there, and the points to those that scatter.
-    fn arrive_all(&self, bounce: u32, sample: u32, memory: &mut PathMemory<S>, hits: &Hits<S>, out: &mut [Sample]) {
+    fn arrive_all(&self, bounce: u32, memory: &mut PathMemory<S>, hits: &Hits<S>, out: &mut Samples) {
         memory.points.iter_mut().for_each(Points::clear);
         memory.looks.clear();
         memory.places.open(memory.now.rays.padded_len());
@@ -257,20 +236,16 @@ impl<'a, S: Real> Paths<'a, S> {
             for lane in lanes_of(hit) {
                 let even = self.looks.even_side(material[lane], place.front >> lane & 1 != 0);
                 let Some((look, model)) = even.filter(|_| known >> lane & 1 != 0) else {
-                    self.arrive(first + lane, bounce, sample, memory, hits, out);
+                    self.arrive(first + lane, bounce, memory, hits, out);
                     continue;
                 };
                 if bounce == 0 {
-                    let seen = &mut out[memory.now.path[first + lane] as usize];
-                    seen.alpha = 1.0;
-                    if self.first_hits {
+                    let path = memory.now.path[first + lane] as usize;
+                    out.colors[path].alpha = 1.0;
+                    if let Some(seen) = out.hits.get_mut(path) {
                         let (org, dir) = memory.now.line(first + lane);
-                        self.met(first + lane, org, dir, hits).resolved(self, material[lane], dir).show(
-                            first + lane,
-                            dir,
-                            hits,
-                            seen,
-                        );
+                        let arrival = self.met(first + lane, org, dir, hits).resolved(self, material[lane], dir);
+                        arrival.show(first + lane, dir, hits, seen);
                     }
                 }
                 if bounce < self.depth {
@@ -281,12 +256,12 @@ impl<'a, S: Real> Paths<'a, S> {
     }
 
     /// The `lanes` of rays `first..first + N` of the wave have left the scene.
-    fn leave(&self, first: usize, lanes: u32, bounce: u32, wave: &Wave<S>, out: &mut [Sample]) {
+    fn leave(&self, first: usize, lanes: u32, bounce: u32, wave: &Wave<S>, out: &mut Samples) {
         let mut shine = |i: usize, light: DVec3| {
-            let seen = &mut out[wave.path[i] as usize];
-            seen.shine(bounce, light);
+            let path = wave.path[i] as usize;
+            out.shine(path, bounce, light);
             if bounce == 0 && light != DVec3::ZERO {
-                seen.alpha = 1.0;
+                out.colors[path].alpha = 1.0;
             }
         };
         let Some((radiance, pdf)) = self.lights.even() else {
@@ -307,18 +282,9 @@ impl<'a, S: Real> Paths<'a, S> {
     }
 
     /// Ray `i` of the wave has arrived where lanes do not know what there is.
-    fn arrive(
-        &self,
-        i: usize,
-        bounce: u32,
-        sample: u32,
-        memory: &mut PathMemory<S>,
-        hits: &Hits<S>,
-        out: &mut [Sample],
-    ) {
+    fn arrive(&self, i: usize, bounce: u32, memory: &mut PathMemory<S>, hits: &Hits<S>, out: &mut Samples) {
         let wave = &memory.now;
-        let (path, (org, dir)) = (wave.path[i], wave.line(i));
-        let seen = &mut out[path as usize];
+        let (path, (org, dir)) = (wave.path[i] as usize, wave.line(i));
         let met = self.met(i, org, dir, hits);
         let surface = &met.surface;
         let emitted = self.looks.emission(surface.material, surface, met.from_front);
@@ -326,18 +292,18 @@ impl<'a, S: Real> Paths<'a, S> {
             let (prim, inst) = (hits.prim[i], hits.inst[i]);
             let pdf = || self.lights.pdf_of_hit(org, surface.position, surface.ng, prim, inst, self.world);
             let pdf = if wave.pdf[i].is_finite() { pdf() } else { 0.0 };
-            seen.shine(bounce, wave.throughput(i) * emitted * wave.weight(i, pdf));
+            out.shine(path, bounce, wave.throughput(i) * emitted * wave.weight(i, pdf));
         }
         if bounce > 0 && bounce == self.depth {
             return;
         }
-        let choice = || number(memory.pixels[path as usize], sample, bounce, MIXTURE);
+        let choice = || memory.draws[path].number(bounce, MIXTURE);
         let material =
             if self.looks.has_mixtures { self.looks.resolve(surface.material, choice()) } else { surface.material };
         let arrival = met.resolved(self, material, dir);
         if bounce == 0 {
-            seen.alpha = 1.0;
-            if self.first_hits {
+            out.colors[path].alpha = 1.0;
+            if let Some(seen) = out.hits.get_mut(path) {
                 arrival.show(i, dir, hits, seen);
             }
             if self.depth == 0 {

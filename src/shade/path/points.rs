@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use super::wave::at_least;
 use crate::lanes::chosen::{Picked, records};
 use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
 use crate::shade::place::Place;
@@ -107,7 +108,7 @@ pub struct PlaceLanes<V> {
 impl<S: Real> Places<S> {
     /// Makes room for those of `padded` rays with their padding.
     pub fn open(&mut self, padded: usize) {
-        self.rows.iter_mut().for_each(|row| row.resize(padded, S::ZERO));
+        self.rows.iter_mut().for_each(|row| at_least(row, padded));
     }
 
     /// Sets those of rays `first..first + N`.

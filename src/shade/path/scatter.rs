@@ -4,10 +4,11 @@ use super::Paths;
 use super::bsdf::Bsdf;
 use super::points::{LookLanes, LookNumbers, PlaceLanes, Places, Points};
 use super::wave::{Shadows, Wave};
-use crate::camera::sobol::{PixelPoints, fraction};
+use crate::camera::sobol::fraction;
 use crate::lanes::chosen::{Chosen, Picked};
 use crate::lanes::space::{Frame, choose, normalize};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, map3};
+use crate::shade::spot::Draw;
 
 /// Bounces before paths may end by chance.
 const FIRST_ROULETTE: u32 = 3;
@@ -32,10 +33,8 @@ struct Numbers<S> {
 
 /// What points know of their paths.
 pub struct Chances<'a> {
-    /// Points of each path's pixel.
-    pub points: &'a [PixelPoints],
-    /// Number of the sample.
-    pub sample: u32,
+    /// The random numbers of each path.
+    pub draws: &'a [Draw],
     /// Number of the bounce, 0 at the first hit.
     pub bounce: u32,
 }
@@ -46,15 +45,15 @@ impl Chances<'_> {
         let zero = [S::ZERO; MAX_LANES];
         let mut numbers =
             Numbers { place: [zero; 2], choice: zero, light: [zero; 2], light_choice: zero, roulette: zero };
-        let mut keys = [PixelPoints::default(); MAX_LANES];
+        let mut keys = [Draw::default(); MAX_LANES];
         for (key, &path) in keys.iter_mut().zip(path) {
-            *key = self.points[path as usize];
+            *key = self.draws[path as usize];
         }
         let first = CAMERA_PAIRS + self.bounce * PAIRS;
         let fill = |pair: u32, x: &mut Column<S>, y: &mut Column<S>| {
             let mut bits = [[0; MAX_LANES]; 2];
             for lane in 0..MAX_LANES {
-                let both = keys[lane].bits(self.sample, first + pair);
+                let both = keys[lane].points.bits(keys[lane].sample, first + pair);
                 (bits[0][lane], bits[1][lane]) = (both[0], both[1]);
             }
             for lane in 0..MAX_LANES {
@@ -149,7 +148,8 @@ impl<S: Real> Paths<'_, S> {
             }
             let [path, rays, looks] = [&path, &rays, &looks].map(|list| &list[..chunk.len()]);
             let numbers = chances.numbers::<S>(path, aims);
-            let packet = Packet::load(arrivals, &Picked::of::<S::Wide>(rays), chances.bounce);
+            let packet =
+                Packet::load(arrivals, &Picked::of::<S::Wide>(rays, arrivals.wave.rays.padded_len()), chances.bounce);
             let bsdf = B::load(&LookLanes::of(arrivals.looks, looks), &self.facets);
             if aims {
                 self.aim(&packet, &bsdf, path, &numbers, shadows);

@@ -13,12 +13,20 @@ pub struct Wave<S> {
     pub rays: Rays<S>,
     /// Path of each.
     pub path: Vec<u32>,
-    /// What of the radiance along the ray reaches the eye.
+    /// What of the radiance along the ray reaches the eye. This and the next two may be longer than there are rays.
     pub throughput: [Vec<S>; 3],
     /// Density with which the direction was found, per solid angle; infinite if no light could be aimed at.
     pub pdf: Vec<S>,
     /// Product of the squared relative indices of refraction that the throughput was divided by.
     pub squeeze: Vec<S>,
+}
+
+/// Makes `column` have `len` values or more: what is left of earlier waves is not taken back, as that is cleared when it is
+/// wanted again.
+pub fn at_least<S: Real>(column: &mut Vec<S>, len: usize) {
+    if column.len() < len {
+        column.resize(len, S::ZERO);
+    }
 }
 
 impl<S: Real> Default for Wave<S> {
@@ -33,7 +41,7 @@ impl<S: Real> Wave<S> {
     pub fn open(&mut self, count: usize) {
         self.rays.open(count);
         self.path.clear();
-        self.columns().into_iter().for_each(|column| column.resize(count.next_multiple_of(PAD), S::ZERO));
+        self.columns().into_iter().for_each(|column| at_least(column, count.next_multiple_of(PAD)));
     }
 
     fn columns(&mut self) -> [&mut Vec<S>; 5] {
@@ -105,7 +113,7 @@ impl<S: Real> Shadows<S> {
     pub fn open(&mut self, count: usize) {
         self.rays.open(count);
         self.path.clear();
-        self.light.iter_mut().for_each(|column| column.resize(count.next_multiple_of(PAD), S::ZERO));
+        self.light.iter_mut().for_each(|column| at_least(column, count.next_multiple_of(PAD)));
     }
 
     /// Adds rays: the lanes `chosen` of origins, directions, light and ends.

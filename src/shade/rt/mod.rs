@@ -24,7 +24,7 @@ use self::level::{Found, Level};
 use self::material::RtMaterial;
 use self::phong::Meetings;
 use self::shadow::Probes;
-use super::sample::Sample;
+use super::sample::{FirstHit, Rgba, Samples};
 use super::shader::{Shader, Workspace};
 use crate::camera::Camera;
 use crate::lanes::{Lanes, Real};
@@ -127,7 +127,7 @@ impl Rt {
 
 impl<S: Real> Shader<'_, S> {
     /// What each primary ray of `rays` sees in `rt`'s lighting model.
-    pub(super) fn rt(&self, rt: &Rt, rays: &Rays<S>, work: &mut Workspace<S>, out: &mut [Sample]) {
+    pub(super) fn rt(&self, rt: &Rt, rays: &Rays<S>, work: &mut Workspace<S>, out: &mut Samples) {
         let mut memory = std::mem::take(&mut work.rt);
         memory.level.start(rays);
         let (mut next, mut lost) = (Vec::new(), Vec::new());
@@ -139,9 +139,7 @@ impl<S: Real> Shader<'_, S> {
                 work.rays.mirror += memory.level.len() as u64;
             } else {
                 memory.first.clone_from(&memory.found.hit);
-                if self.settings.first_hits {
-                    see(&memory.found, out);
-                }
+                see(&memory.found, &mut out.hits);
             }
             self.rt_sort(rt, &mut memory, &work.hits, &mut next, &mut lost, out);
             self.rt_lost(rt, &lost, &mut memory, work, out);
@@ -151,9 +149,9 @@ impl<S: Real> Shader<'_, S> {
             lost.clear();
             is_primary = false;
         }
-        for (first, hit) in (0..out.len()).step_by(S::Wide::N).zip(&memory.first) {
-            let samples = out[first..].iter_mut().take(S::Wide::N).enumerate();
-            samples.filter(|(lane, _)| hit >> lane & 1 != 0).for_each(|(_, sample)| not_the_background(sample));
+        for (first, hit) in (0..rays.len()).step_by(S::Wide::N).zip(&memory.first) {
+            let colors = out.colors[first..].iter_mut().take(S::Wide::N).enumerate();
+            colors.filter(|(lane, _)| hit >> lane & 1 != 0).for_each(|(_, color)| not_the_background(color));
         }
         work.rt = memory;
     }
@@ -167,7 +165,7 @@ impl<S: Real> Shader<'_, S> {
         hits: &Hits<S>,
         next: &mut Vec<Path>,
         lost: &mut Vec<u32>,
-        out: &mut [Sample],
+        out: &mut Samples,
     ) {
         let Memory { level, found, meetings, .. } = memory;
         meetings.open(level.rays.padded_len());
@@ -176,7 +174,7 @@ impl<S: Real> Shader<'_, S> {
                 continue;
             }
             let carry = level.carry(i);
-            out[carry.pixel as usize].alpha = 1.0;
+            out.colors[carry.pixel as usize].alpha = 1.0;
             if carry.within.is_some() {
                 glass::step(level, i, found, next);
             } else if !found.is_hit(i) {
@@ -187,7 +185,7 @@ impl<S: Real> Shader<'_, S> {
                     next.push(Path { org: found.position(i), carry: Carry { left: None, ..carry }, ..path });
                 } else {
                     let color = INSIDE.0 * INSIDE.1.powi((MAX_BOUNCES + 1).saturating_sub(carry.level) as i32);
-                    out[carry.pixel as usize].radiance += carry.throughput * color;
+                    out.colors[carry.pixel as usize].radiance += carry.throughput * color;
                 }
             } else {
                 let region = found.region[i];
@@ -203,7 +201,7 @@ impl<S: Real> Shader<'_, S> {
     }
 
     /// Rays that nothing stops: the surroundings, or the inside of a solid without end.
-    fn rt_lost(&self, rt: &Rt, lost: &[u32], memory: &mut Memory<S>, work: &mut Workspace<S>, out: &mut [Sample]) {
+    fn rt_lost(&self, rt: &Rt, lost: &[u32], memory: &mut Memory<S>, work: &mut Workspace<S>, out: &mut Samples) {
         let Memory { level, back, shadow, .. } = memory;
         let looks_back = rt.unbounded.contains(&true) && !lost.is_empty();
         if looks_back {
@@ -229,13 +227,13 @@ impl<S: Real> Shader<'_, S> {
                 None => BACKGROUND,
             };
             let carry = level.carry(i as usize);
-            out[carry.pixel as usize].radiance += carry.throughput * color;
+            out.colors[carry.pixel as usize].radiance += carry.throughput * color;
         }
     }
 }
 
 /// What the pixels' other planes show of the primary rays.
-fn see<S: Real>(found: &Found<S>, out: &mut [Sample]) {
+fn see<S: Real>(found: &Found<S>, out: &mut [FirstHit]) {
     for (i, sample) in out.iter_mut().enumerate().filter(|(i, _)| found.is_hit(*i)) {
         sample.distance = found.t[i].to_f64();
         sample.normal = found.normal(i);
@@ -244,13 +242,13 @@ fn see<S: Real>(found: &Found<S>, out: &mut [Sample]) {
 }
 
 /// `rt` keeps the background's colour for the background: a hit of that very colour becomes one step bluer.
-fn not_the_background(sample: &mut Sample) {
-    let color = sample.radiance;
+fn not_the_background(seen: &mut Rgba) {
+    let color = seen.radiance;
     // Most are brighter.
     if color.max_element() * 255.0 < 1.5 {
         let byte = |x: f64| (x * 255.0 + 0.5) as u8;
         if [color.x, color.y, color.z].map(byte) == [0, 0, 1] {
-            sample.radiance = DVec3::new(0.0, 0.0, 2.0 / 255.0);
+            seen.radiance = DVec3::new(0.0, 0.0, 2.0 / 255.0);
         }
     }
 }

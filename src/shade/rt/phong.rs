@@ -10,7 +10,7 @@ use super::shadow::Probes;
 use super::{AIR, AMBIENT, MAX_BOUNCES, Memory, Path, Rt, TOLERANCE, Within};
 use crate::lanes::chosen::{at, lanes_of, packets, spill};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, space};
-use crate::shade::sample::Sample;
+use crate::shade::sample::Samples;
 use crate::shade::shader::{Shader, Workspace};
 
 /// What the paths of a level show where they enter regions, parallel to its rays.
@@ -86,7 +86,7 @@ impl<S: Real> Shader<'_, S> {
         memory: &mut Memory<S>,
         next: &mut Vec<Path>,
         work: &mut Workspace<S>,
-        out: &mut [Sample],
+        out: &mut Samples,
     ) {
         let Memory { level, found, meetings, probes, next_probes, shadow, .. } = memory;
         unlit(rt, level, found, meetings);
@@ -112,7 +112,7 @@ impl<S: Real> Shader<'_, S> {
                     _ => color,
                 };
                 let carry = level.carry(i);
-                out[carry.pixel as usize].radiance += carry.throughput * shown;
+                out.colors[carry.pixel as usize].radiance += carry.throughput * shown;
             }
         }
     }

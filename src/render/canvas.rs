@@ -1,0 +1,85 @@
+//! The tiles of a picture: their rays, made and shaded.
+
+use std::ops::Range;
+
+use super::options::RenderOptions;
+use super::patch::Patch;
+use crate::camera::{Camera, Passes, PixelRect, Tiling, fill_passes, fill_pixels, morton_decode};
+use crate::lanes::Real;
+use crate::ray::Rays;
+use crate::shade::{Samples, Shader, Spot, Workspace};
+
+/// What is seen, and how it is cut into tiles.
+pub(super) struct Canvas<'a> {
+    pub camera: &'a Camera,
+    pub options: &'a RenderOptions,
+    pub tiling: Tiling,
+    /// Pixels that are wanted.
+    pub rect: PixelRect,
+}
+
+/// One thread's arrays, reused from tile to tile.
+pub(super) struct Memory<S> {
+    pub work: Workspace<S>,
+    /// Pixels of a batch, also those of dead rays.
+    pub pixels: Vec<(u32, u32)>,
+    /// What the rays of the batch saw.
+    pub samples: Samples,
+    pub patch: Patch,
+    rays: Rays<S>,
+    spots: Vec<Spot>,
+}
+
+impl<S: Real> Default for Memory<S> {
+    fn default() -> Self {
+        Self {
+            work: Workspace::default(),
+            pixels: Vec::new(),
+            samples: Samples::default(),
+            patch: Patch::default(),
+            rays: Rays::new(0),
+            spots: Vec::new(),
+        }
+    }
+}
+
+impl Canvas<'_> {
+    /// Makes the pixels of `memory` those of a tile, in Morton order.
+    pub fn list_pixels<S>(&self, tile: u32, memory: &mut Memory<S>) {
+        let (x0, y0) = self.tiling.origin(tile);
+        memory.pixels.clear();
+        let places = (0..self.tiling.rays_per_tile()).map(morton_decode);
+        memory.pixels.extend(places.map(|(dx, dy)| (x0 + dx, y0 + dy)));
+    }
+
+    /// Traces the samples `numbers` of the pixels of a tile, which `memory` lists, as one batch into `memory.samples`.
+    pub fn shade<S: Real>(
+        &self,
+        shader: &Shader<'_, S>,
+        tile: u32,
+        numbers: Range<u32>,
+        memory: &mut Memory<S>,
+    ) -> Passes {
+        let sub_pixels: Vec<_> = numbers.clone().map(|sample| self.options.sub_pixel(sample)).collect();
+        let passes = Passes::new(&self.tiling, sub_pixels.len() as u32);
+        let Memory { rays, spots, pixels, samples, work, .. } = memory;
+        fill_passes(self.camera, &self.tiling, tile, self.rect, &sub_pixels, rays);
+        spots.clear();
+        for run in passes.runs() {
+            let sample = numbers.start + run.pass;
+            spots.extend(pixels[run.pixels].iter().map(|&(x, y)| Spot { x, y, sample }));
+        }
+        shader.shade(rays, spots, work, samples);
+        passes
+    }
+
+    /// Traces the first sample of each of the pixels of `memory`.
+    pub fn shade_pixels<S: Real>(&self, shader: &Shader<'_, S>, memory: &mut Memory<S>) {
+        let Memory { rays, spots, pixels, samples, work, .. } = memory;
+        let size = (self.tiling.width(), self.tiling.height());
+        fill_pixels(self.camera, size, pixels, self.options.sub_pixel(0), rays);
+        spots.clear();
+        spots.extend(pixels.iter().map(|&(x, y)| Spot { x, y, sample: 0 }));
+        shader.shade(rays, spots, work, samples);
+    }
+}

@@ -1,0 +1,174 @@
+//! Sums of the samples of a tile's pixels.
+
+use glam::DVec3;
+
+use super::pixels::{Pixel, brightness};
+use crate::camera::Passes;
+use crate::shade::{FirstHit, Rgba, Samples};
+
+/// Sums of the samples of pixels. What only further planes show is not kept where there are none.
+#[derive(Debug)]
+pub(super) struct Sums {
+    colors: Vec<Color>,
+    /// Sums of what else was seen; empty if it is not wanted.
+    hits: Vec<FirstHit>,
+    with_hits: bool,
+}
+
+/// What every picture shows of some samples.
+#[derive(Clone, Copy, Debug, Default)]
+struct Color {
+    radiance: DVec3,
+    alpha: f64,
+    /// Sum of squared brightness.
+    square: f64,
+}
+
+impl Sums {
+    /// No room yet; for first hits too, or not.
+    pub fn new(with_hits: bool) -> Self {
+        Self { colors: Vec::new(), hits: Vec::new(), with_hits }
+    }
+
+    /// Room for `pixels` sums, empty where there were none.
+    pub fn make_room(&mut self, pixels: usize) {
+        self.colors.resize(pixels, Color::default());
+        self.hits.resize(if self.with_hits { pixels } else { 0 }, FirstHit::NONE);
+    }
+
+    /// Forgets all sums, but not the memory.
+    pub fn clear(&mut self) {
+        self.colors.clear();
+        self.hits.clear();
+    }
+
+    /// Adds what ray `ray` saw to sum number `pixel`.
+    pub fn add(&mut self, pixel: usize, samples: &Samples, ray: usize) {
+        add_color(&mut self.colors[pixel], &samples.colors[ray]);
+        if let Some(sum) = self.hits.get_mut(pixel) {
+            add_hit(sum, &samples.hits[ray]);
+        }
+    }
+
+    /// Adds what the rays of `passes` over the tile saw.
+    pub fn add_passes(&mut self, passes: Passes, samples: &Samples) {
+        for run in passes.runs() {
+            let sums = &mut self.colors[run.pixels.clone()];
+            sums.iter_mut().zip(&samples.colors[run.rays.clone()]).for_each(|(sum, color)| add_color(sum, color));
+            if self.with_hits {
+                let sums = &mut self.hits[run.pixels];
+                sums.iter_mut().zip(&samples.hits[run.rays]).for_each(|(sum, hit)| add_hit(sum, hit));
+            }
+        }
+    }
+
+    /// The pixels whose sums are of `count` samples; what is not kept reads as of a miss.
+    pub fn pixels(&self, count: u32) -> impl Iterator<Item = Pixel> {
+        self.colors.iter().enumerate().map(move |(pixel, color)| {
+            let hit = self.hits.get(pixel).copied().unwrap_or(FirstHit::NONE);
+            let n = f64::from(count);
+            Pixel {
+                color: Rgba { radiance: color.radiance / n, alpha: color.alpha / n },
+                hit: FirstHit {
+                    normal: hit.normal / n,
+                    shading_normal: hit.shading_normal / n,
+                    albedo: hit.albedo / n,
+                    direct: hit.direct / n,
+                    nodes: hit.nodes / n,
+                    ..hit
+                },
+                variance: variance(color, count),
+                samples: count,
+            }
+        })
+    }
+
+    /// Estimate of the relative error of the mean brightness of pixels of `count` samples: root of the mean variance over
+    /// the mean.
+    pub fn error(&self, count: u32) -> f64 {
+        let mean: f64 = self.colors.iter().map(|sum| brightness(sum.radiance) / f64::from(count)).sum();
+        let square: f64 = self.colors.iter().map(|sum| variance(sum, count)).sum();
+        let pixels = self.colors.len() as f64;
+        if square > 0.0 { (square / pixels).sqrt() / (mean / pixels).max(f64::MIN_POSITIVE) } else { 0.0 }
+    }
+
+    /// Gives the memory back.
+    pub fn free(&mut self) {
+        (self.colors, self.hits) = (Vec::new(), Vec::new());
+    }
+}
+
+#[inline]
+fn add_color(sum: &mut Color, color: &Rgba) {
+    sum.radiance += color.radiance;
+    sum.square += brightness(color.radiance).powi(2);
+    sum.alpha += color.alpha;
+}
+
+/// Normals, colours and costs add up (misses count as 0); distance, position and ids come together from the nearest
+/// sample, the first of equals.
+#[inline]
+fn add_hit(sum: &mut FirstHit, hit: &FirstHit) {
+    sum.normal += hit.normal;
+    sum.shading_normal += hit.shading_normal;
+    sum.albedo += hit.albedo;
+    sum.direct += hit.direct;
+    sum.nodes += hit.nodes;
+    if hit.distance < sum.distance {
+        sum.distance = hit.distance;
+        sum.position = hit.position;
+        (sum.inst, sum.prim, sum.material) = (hit.inst, hit.prim, hit.material);
+    }
+}
+
+/// Variance of the mean brightness that the `count` samples in `sum` estimate; 0 for one sample.
+fn variance(sum: &Color, count: u32) -> f64 {
+    if count < 2 {
+        return 0.0;
+    }
+    let n = f64::from(count);
+    let mean = brightness(sum.radiance) / n;
+    ((sum.square / n - mean * mean).max(0.0)) / (n - 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Tiling;
+
+    #[test]
+    fn samples_average_and_the_nearest_gives_distance_and_ids() {
+        let red = Rgba { radiance: DVec3::X, alpha: 1.0 };
+        let far = FirstHit { distance: 9.0, inst: 1, prim: 2, ..FirstHit::NONE };
+        let near = FirstHit { distance: 3.0, prim: 5, nodes: 8.0, ..far };
+        let twin = FirstHit { prim: 6, ..near };
+        let colors = vec![red, Rgba::default(), red, red];
+        let samples = Samples { colors, hits: vec![far, FirstHit::NONE, near, twin] };
+        let mut sums = Sums::new(true);
+        sums.make_room(1);
+        (0..4).for_each(|ray| sums.add(0, &samples, ray));
+        let pixel = sums.pixels(4).next().unwrap();
+        assert_eq!((pixel.color.radiance, pixel.color.alpha, pixel.hit.nodes), (DVec3::X * 0.75, 0.75, 4.0));
+        assert_eq!((pixel.hit.distance, pixel.hit.inst, pixel.hit.prim), (3.0, 1, 5));
+        // Brightness 1/3, 0, 1/3, 1/3: 1/48 around the mean, over n - 1.
+        assert!((pixel.variance - 1.0 / 144.0).abs() < 1e-15 && pixel.samples == 4);
+        assert!((sums.error(4) - (1.0_f64 / 144.0).sqrt() / 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn passes_add_up_pixel_by_pixel() {
+        let passes = Passes::new(&Tiling::new(64, 64, 32).unwrap(), 3);
+        let mut samples = Samples { colors: vec![Rgba::default(); passes.rays()], hits: Vec::new() };
+        for run in passes.runs() {
+            for (ray, pixel) in run.rays.zip(run.pixels) {
+                samples.colors[ray].radiance = DVec3::new(pixel as f64, f64::from(run.pass), 0.0);
+            }
+        }
+        let mut sums = Sums::new(false);
+        sums.make_room(1024);
+        sums.add_passes(passes, &samples);
+        for (i, pixel) in sums.pixels(3).enumerate() {
+            assert_eq!((pixel.color.radiance, pixel.hit), (DVec3::new(i as f64, 1.0, 0.0), FirstHit::NONE));
+        }
+    }
+}
