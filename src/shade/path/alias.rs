@@ -43,11 +43,14 @@ impl Alias {
     }
 
     /// The index chosen by `u` in [0, 1); `None` if nothing has weight.
+    #[inline]
     pub fn choose(&self, u: f64) -> Option<usize> {
+        let last = self.bins.len().checked_sub(1)?;
         let place = u * self.bins.len() as f64;
-        let bin = (place as usize).min(self.bins.len().checked_sub(1)?);
+        let bin = (place as usize).min(last);
         let (own, other) = self.bins[bin];
-        Some(if place - bin as f64 >= own { other as usize } else { bin })
+        // Looked up, as nobody can foresee it.
+        Some([bin, other as usize][usize::from(place - bin as f64 >= own)])
     }
 
     /// Chance of index `i`.

@@ -24,7 +24,30 @@ pub enum Form<S> {
     Other,
 }
 
+/// Kinds of [`Form`]s.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// [`Form::Triangle`]
+    Triangle,
+    /// [`Form::Ball`]
+    Ball,
+    /// [`Form::Sky`]
+    Sky,
+    /// [`Form::Other`]
+    Other,
+}
+
 impl<S> Form<S> {
+    /// Its kind.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Triangle(_) => Kind::Triangle,
+            Self::Ball(_) => Kind::Ball,
+            Self::Sky(_) => Kind::Sky,
+            Self::Other => Kind::Other,
+        }
+    }
+
     /// The numbers of a triangle.
     pub fn triangle(&self) -> Option<&[S; FLAT]> {
         if let Self::Triangle(numbers) = self { Some(numbers) } else { None }

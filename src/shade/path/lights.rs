@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::alias::Alias;
 use super::emitter::{Aim, Emitter};
-use super::form::Form;
+use super::form::{Form, Kind};
 use super::sky::Sky;
 use crate::lanes::Real;
 use crate::scene::assembly::{Part, PartKind};
@@ -22,6 +22,8 @@ pub struct Lights<'a, S> {
     emitters: Vec<Emitter>,
     /// Parallel to the list, the sky last: what packets need of them.
     forms: Vec<Form<S>>,
+    /// Parallel to them: kind and chance.
+    kinds: Vec<(Kind, S)>,
     alias: Alias,
     /// Per placement: the number of its first emitting primitive in the list; `u32::MAX` if it has none.
     first: Vec<u32>,
@@ -52,11 +54,14 @@ impl<'a, S: Real> Lights<'a, S> {
         share(&mut weights, |i| emitters.get(i).is_none_or(Emitter::is_far));
         let of_sky =
             sky.as_ref().and_then(Sky::even).map_or(Form::Other, |light| Form::Sky(light.to_array().map(S::from_f64)));
-        let forms = emitters.iter().map(|e| e.form(looks)).chain([of_sky]).collect();
+        let forms: Vec<_> = emitters.iter().map(|e| e.form(looks)).chain([of_sky]).collect();
+        let alias = Alias::new(&weights);
+        let kind = |(i, form): (usize, &Form<S>)| (form.kind(), S::from_f64(alias.chance(i)));
         Self {
             emitters,
+            kinds: forms.iter().enumerate().map(kind).collect(),
             forms,
-            alias: Alias::new(&weights),
+            alias,
             first,
             runs,
             sky_index,
@@ -66,11 +71,12 @@ impl<'a, S: Real> Lights<'a, S> {
         }
     }
 
-    /// The light that `choice` in [0, 1) falls on, and its chance.
-    #[inline]
-    pub fn choose(&self, choice: f64) -> Option<(usize, f64)> {
+    /// The light that `choice` in [0, 1) falls on, its kind and its chance.
+    #[inline(always)]
+    pub fn choose(&self, choice: f64) -> Option<(usize, Kind, S)> {
         let index = self.alias.choose(choice)?;
-        Some((index, self.alias.chance(index)))
+        let (kind, chance) = self.kinds[index];
+        Some((index, kind, chance))
     }
 
     /// What packets need of light `index`.
@@ -84,15 +90,8 @@ impl<'a, S: Real> Lights<'a, S> {
         self.alias.choose(0.0).is_none()
     }
 
-    /// Aims from `from` at light `index`, whose chance is `chance`.
-    pub fn aim(
-        &self,
-        from: DVec3,
-        (index, chance): (usize, f64),
-        place: [f64; 2],
-        world: &World<S>,
-        looks: &Looks<'_>,
-    ) -> Option<Aim> {
+    /// Aims from `from` at light `index`.
+    pub fn aim(&self, from: DVec3, index: usize, place: [f64; 2], world: &World<S>, looks: &Looks<'_>) -> Option<Aim> {
         let aim = if index == self.sky_index {
             let sky = self.sky.as_ref()?;
             let (dir, radiance, pdf) = sky.sample(place)?;
@@ -100,6 +99,7 @@ impl<'a, S: Real> Lights<'a, S> {
         } else {
             self.emitters[index].aim(from, place, world, looks)?
         };
+        let chance = self.alias.chance(index);
         let pdf = if aim.is_point { chance } else { aim.pdf * chance };
         (pdf > 0.0).then_some(Aim { pdf, ..aim })
     }

@@ -7,10 +7,11 @@ use glam::DVec3;
 
 use super::Paths;
 use super::bsdf::warp::disc;
-use super::form::{BALL, FLAT, Form};
+use super::form::{BALL, FLAT, Kind};
 use super::scatter::Column;
-use crate::lanes::chosen::{at, records, spill};
+use crate::lanes::chosen::{at, lanes_of, records, spill};
 use crate::lanes::space::{Frame, choose, scale, sub};
+use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each};
 
 /// Spheres closer than this, in squares of radii from the centre, are aimed at one by one.
@@ -41,68 +42,93 @@ impl<S: Real> Paths<'_, S> {
     /// place, one for the choice.
     #[inline(always)]
     pub(super) fn targets(&self, from: Lanes3<S::Wide>, count: usize, u: &[Column<S>; 3]) -> Targets<S::Wide> {
-        let zero = [S::ZERO; MAX_LANES];
-        let (mut dir, mut radiance, mut target) = ([zero; 3], [zero; 3], [zero; 3]);
-        // Without light the density is 1 and the radiance 0.
-        let (mut pdf, mut near, mut points) = ([S::ONE; MAX_LANES], zero, 0);
-        let (mut which, [mut flats, mut balls, mut skies]) = ([0; MAX_LANES], [0u32; 3]);
-        let position = spill(from);
+        let all = (1 << count.min(MAX_LANES)) - 1;
+        let (mut which, mut kinds, mut chance) = ([0; MAX_LANES], [0; MAX_LANES], [S::ONE; MAX_LANES]);
+        // Nothing branches on what is chosen: it is a surprise every time.
         for lane in 0..count.min(MAX_LANES) {
-            let Some((index, chance)) = self.lights.choose(u[2][lane].to_f64()) else { continue };
-            (which[lane], pdf[lane]) = (index as u32, S::from_f64(chance));
-            match self.lights.form(index) {
-                Form::Triangle(_) => flats |= 1 << lane,
-                Form::Ball(ball) if is_outside(ball, at(&position, lane)) => balls |= 1 << lane,
-                Form::Sky(_) => skies |= 1 << lane,
-                Form::Ball(_) | Form::Other => {
-                    let from = DVec3::from(at(&position, lane).map(S::to_f64));
-                    let place = [u[0][lane].to_f64(), u[1][lane].to_f64()];
-                    pdf[lane] = S::ONE;
-                    let Some(aim) = self.lights.aim(from, (index, chance), place, self.world, &self.looks) else {
-                        continue;
-                    };
-                    for axis in 0..3 {
-                        dir[axis][lane] = S::from_f64(aim.dir[axis]);
-                        radiance[axis][lane] = S::from_f64(aim.radiance[axis]);
-                        target[axis][lane] = S::from_f64(aim.target[axis]);
-                    }
-                    pdf[lane] = S::from_f64(aim.pdf);
-                    near[lane] = if aim.is_far { S::ZERO } else { S::ONE };
-                    points |= u32::from(aim.is_point) << lane;
-                }
-            }
+            let Some((index, kind, its)) = self.lights.choose(u[2][lane].to_f64()) else { break };
+            (which[lane], kinds[lane], chance[lane]) = (index as u32, kind as u32, its);
         }
-        let load = |columns: &[Column<S>; 3]| each(|axis| S::Wide::load(&columns[axis]));
-        let mut targets = Targets {
-            place: load(&target),
-            near: S::Wide::load(&near),
-            dir: load(&dir),
-            pdf: S::Wide::load(&pdf),
-            radiance: load(&radiance),
-            is_point: Mask::<S>::from_bits(points),
-        };
-        let u = [S::Wide::load(&u[0]), S::Wide::load(&u[1])];
+        let of_kind = |kind: Kind| positions(&kinds, kind as u32) & all;
+        let (flats, balls, skies) = (of_kind(Kind::Triangle), of_kind(Kind::Ball), of_kind(Kind::Sky));
+        let place = [S::Wide::load(&u[0]), S::Wide::load(&u[1])];
         let form = |index: u32| self.lights.form(index as usize);
         let (no_triangle, no_ball, no_sky) = ([S::ZERO; FLAT], [S::ZERO; BALL], [S::ZERO; 3]);
+        let mut targets = Targets::none(S::Wide::load(&chance));
+        let mut others = of_kind(Kind::Other);
         if flats != 0 {
             let numbers = records(flats, &which, |index| form(index).triangle().unwrap_or(&no_triangle));
-            targets = on_triangles(from, &numbers, u, Mask::<S>::from_bits(flats), &targets);
+            targets = on_triangles(from, &numbers, place, Mask::<S>::from_bits(flats), &targets);
         }
         if balls != 0 {
             let numbers = records(balls, &which, |index| form(index).ball().unwrap_or(&no_ball));
-            targets = on_balls(from, &numbers, u, Mask::<S>::from_bits(balls), &targets);
+            let outside = is_outside(from, &numbers).bits();
+            others |= balls & !outside;
+            targets = on_balls(from, &numbers, place, Mask::<S>::from_bits(balls & outside), &targets);
         }
         if skies != 0 {
             let numbers = records(skies, &which, |index| form(index).sky().unwrap_or(&no_sky));
-            targets = in_the_sky(numbers, u, Mask::<S>::from_bits(skies), &targets);
+            targets = in_the_sky(numbers, place, Mask::<S>::from_bits(skies), &targets);
         }
-        targets
+        if others != 0 { self.one_by_one(from, &which, u, others, &targets) } else { targets }
+    }
+
+    /// The same for the lanes `lanes`, whose lights are `which`, and `targets` elsewhere.
+    #[inline(never)]
+    fn one_by_one(
+        &self,
+        from: Lanes3<S::Wide>,
+        which: &[u32; MAX_LANES],
+        u: &[Column<S>; 3],
+        lanes: u32,
+        targets: &Targets<S::Wide>,
+    ) -> Targets<S::Wide> {
+        let zero = [S::ZERO; MAX_LANES];
+        let (mut dir, mut radiance, mut place) = ([zero; 3], [zero; 3], [zero; 3]);
+        // Without light the density is 1 and the radiance 0.
+        let (mut pdf, mut near, mut points) = ([S::ONE; MAX_LANES], zero, 0);
+        let position = spill(from);
+        for lane in lanes_of(lanes) {
+            let from = DVec3::from(at(&position, lane).map(S::to_f64));
+            let (index, two) = (which[lane] as usize, [u[0][lane].to_f64(), u[1][lane].to_f64()]);
+            let Some(aim) = self.lights.aim(from, index, two, self.world, &self.looks) else { continue };
+            for axis in 0..3 {
+                dir[axis][lane] = S::from_f64(aim.dir[axis]);
+                radiance[axis][lane] = S::from_f64(aim.radiance[axis]);
+                place[axis][lane] = S::from_f64(aim.target[axis]);
+            }
+            pdf[lane] = S::from_f64(aim.pdf);
+            near[lane] = if aim.is_far { S::ZERO } else { S::ONE };
+            points |= u32::from(aim.is_point) << lane;
+        }
+        let mask = Mask::<S>::from_bits(lanes);
+        let load = |columns: &[Column<S>; 3]| each(|axis| S::Wide::load(&columns[axis]));
+        Targets {
+            place: choose(mask, load(&place), targets.place),
+            near: S::Wide::select(mask, S::Wide::load(&near), targets.near),
+            dir: choose(mask, load(&dir), targets.dir),
+            pdf: S::Wide::select(mask, S::Wide::load(&pdf), targets.pdf),
+            radiance: choose(mask, load(&radiance), targets.radiance),
+            is_point: Mask::<S>::from_bits(points),
+        }
     }
 }
 
-fn is_outside<S: Real>(ball: &[S; BALL], from: [S; 3]) -> bool {
-    let away: [f64; 3] = each(|axis| ball[axis].to_f64() - from[axis].to_f64());
-    dot(away, away) > CLOSE * ball[3].to_f64().powi(2)
+impl<V: Lanes> Targets<V> {
+    /// No light, with a density.
+    #[inline(always)]
+    fn none(pdf: V) -> Self {
+        let zero = V::constant(0.0);
+        let nothing = [zero; 3];
+        Self { place: nothing, near: zero, dir: nothing, pdf, radiance: nothing, is_point: zero.cmp_lt(zero) }
+    }
+}
+
+/// Whether points are outside of spheres, and not too close to them.
+#[inline(always)]
+fn is_outside<V: Lanes>(from: Lanes3<V>, ball: &[V; BALL]) -> V::Mask {
+    let away = sub([ball[0], ball[1], ball[2]], from);
+    (V::constant(CLOSE) * (ball[3] * ball[3])).cmp_lt(dot(away, away))
 }
 
 /// Uniform points of emitting triangles in the lanes `lanes`, whose chance is the density in `others`.
@@ -197,12 +223,6 @@ mod tests {
     use crate::lanes::f64x8;
     use crate::shade::path::emitter::Emitter;
 
-    fn nothing() -> Targets<f64x8> {
-        let zero = f64x8::splat(0.0);
-        let (dir, is_point) = ([zero; 3], zero.cmp_lt(zero));
-        Targets { place: dir, near: zero, dir, pdf: f64x8::splat(0.5), radiance: dir, is_point }
-    }
-
     /// Calls `found` with each of many targets that `aim` finds from two numbers.
     fn many(aim: impl Fn([f64x8; 2]) -> Targets<f64x8>, mut found: impl FnMut(DVec3, DVec3, f64, f64)) {
         let points = PixelPoints::new(3, 1, 4);
@@ -224,7 +244,7 @@ mod tests {
         let (lanes, at) = (LaneMask::from_bits(0xff), from.to_array().map(f64x8::splat));
         let mut mean = DVec3::ZERO;
         many(
-            |u| on_balls(at, &ball, u, lanes, &nothing()),
+            |u| on_balls(at, &ball, u, lanes, &Targets::none(f64x8::splat(0.5))),
             |place, dir, pdf, near| {
                 assert!(((place - centre).length() - radius).abs() < 1e-6 && near == 1.0);
                 let normal = (place - centre) / radius;
@@ -243,7 +263,7 @@ mod tests {
     fn the_sky_is_even() {
         let (mut mean, mut squares, lanes) = (DVec3::ZERO, DVec3::ZERO, LaneMask::from_bits(0xff));
         many(
-            |u| in_the_sky([f64x8::splat(1.0); 3], u, lanes, &nothing()),
+            |u| in_the_sky([f64x8::splat(1.0); 3], u, lanes, &Targets::none(f64x8::splat(0.5))),
             |place, dir, pdf, near| {
                 assert!(place == dir && near == 0.0 && (dir.length() - 1.0).abs() < 1e-12);
                 assert!((pdf - 0.5 / (2.0 * TAU)).abs() < 1e-12);
