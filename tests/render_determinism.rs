@@ -46,12 +46,15 @@ fn threads_and_tiles_change_nothing<S: Engines>() {
     let d = scene();
     let world = World::<S>::compile(&d, Preset::Balanced).unwrap();
     let camera = Camera::new(&framing(world.bounds(), 67.0 / 45.0), 67.0 / 45.0).unwrap();
-    for integrator in [Integrator::Whitted, Integrator::Ao, Integrator::Cost] {
+    // Of paths several samples are traced together: here one, one, two, two.
+    for (integrator, spp) in
+        [(Integrator::Whitted, 3), (Integrator::Ao, 3), (Integrator::Cost, 3), (Integrator::Path, 6)]
+    {
         let mut first = None;
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             for tile in [8, 16, 32] {
-                let options = RenderOptions { tile, integrator, ..options() };
+                let options = RenderOptions { tile, integrator, spp, ..options() };
                 let output = pool.install(|| render(&world, &d, &camera, &options, &Silent).unwrap());
                 assert!(output.is_complete());
                 let got = (bits(&output), output.rays);
@@ -60,7 +63,7 @@ fn threads_and_tiles_change_nothing<S: Engines>() {
             }
         }
         let (planes, rays) = first.unwrap();
-        assert_eq!(rays.primary, 67 * 45 * 3);
+        assert_eq!(rays.primary, 67 * 45 * u64::from(spp));
         assert_eq!(planes[4].0, "Z");
         assert!(planes[4].1.iter().any(|&b| b != planes[4].1[0]), "a picture with something in it");
     }

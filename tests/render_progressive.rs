@@ -86,7 +86,7 @@ fn cases() -> impl Strategy<Value = (RenderOptions, u32, usize, u64)> {
     size.prop_flat_map(move |(width, height)| {
         let look =
             proptest::sample::select(vec![Integrator::Whitted, Integrator::Ao, Integrator::Cost, Integrator::Path]);
-        let numbers = (1..5u32, any::<u64>(), proptest::sample::select(vec![8, 16, 32]), 0..400u64);
+        let numbers = (1..10u32, any::<u64>(), proptest::sample::select(vec![8, 16, 32]), 0..400u64);
         let start = proptest::sample::select(vec![1, 2, 4, 8, 16]);
         let engine = proptest::sample::select(names.clone());
         (crops(width, height), look, numbers, start, 1..4usize, engine).prop_map(

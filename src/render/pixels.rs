@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::shade::{FirstHit, Rgba, Samples};
+use crate::shade::{FirstHit, Rgba};
 
 /// A pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,12 +21,6 @@ impl Pixel {
     /// Without a sample.
     pub const EMPTY: Self =
         Self { color: Rgba { radiance: DVec3::ZERO, alpha: 0.0 }, hit: FirstHit::NONE, variance: 0.0, samples: 0 };
-
-    /// Of one sample: what ray `ray` saw.
-    pub fn of_one(samples: &Samples, ray: usize) -> Self {
-        let hit = samples.hits.get(ray).copied().unwrap_or(FirstHit::NONE);
-        Self { color: samples.colors[ray], hit, variance: 0.0, samples: 1 }
-    }
 }
 
 /// What samples of a pixel are compared by.

@@ -11,7 +11,7 @@ use super::mattes::{Coverage, Mattes};
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{channels, empty_film};
 use super::pixels::Pixel;
-use super::sums::Sums;
+use super::sums::{Sums, alone};
 use super::tally::Tally;
 use crate::camera::Camera;
 use crate::error::{Result, locked};
@@ -165,6 +165,11 @@ impl Tile {
 }
 
 impl<S: Real> Job<'_, S> {
+    /// Whether there is nothing to sum up: a tile is painted from its only samples.
+    fn is_of_one_sample(&self) -> bool {
+        self.canvas.options.spp == 1 && !self.canvas.options.is_adaptive()
+    }
+
     /// Some tile.
     fn tile(&self) -> Tile {
         let sums = Sums::new(!self.canvas.options.aovs.is_empty());
@@ -174,7 +179,9 @@ impl<S: Real> Job<'_, S> {
     /// Adds samples to `tile` until there are `spp` of each pixel; false if stopped before.
     fn samples(&self, tile: &mut Tile, spp: u32, memory: &mut Memory<S>) -> bool {
         self.canvas.list_pixels(tile.number, memory);
-        tile.sums.make_room(memory.pixels.len());
+        if !self.is_of_one_sample() {
+            tile.sums.make_room(memory.pixels.len());
+        }
         while tile.count < spp {
             if self.progress.stopped() {
                 return false;
@@ -184,7 +191,9 @@ impl<S: Real> Job<'_, S> {
             if let Some(mattes) = &self.mattes {
                 mattes.count(passes, memory.pixels.len(), &memory.samples.hits, &mut tile.coverages);
             }
-            tile.sums.add_passes(passes, &memory.samples);
+            if !self.is_of_one_sample() {
+                tile.sums.add_passes(passes, &memory.samples);
+            }
             tile.count += passes.count();
         }
         true
@@ -236,7 +245,11 @@ impl<S: Real> Job<'_, S> {
 
     /// Takes what the planes get from a finished tile, whose pixels `memory` lists.
     fn fill(&self, tile: &Tile, memory: &mut Memory<S>) {
-        let pixels: Vec<Pixel> = tile.sums.pixels(tile.count).collect();
+        let pixels: Vec<Pixel> = if self.is_of_one_sample() {
+            (0..memory.pixels.len()).map(|ray| alone(&memory.samples, ray)).collect()
+        } else {
+            tile.sums.pixels(tile.count).collect()
+        };
         memory.patch.fill(&self.channels, self.window, &memory.pixels, &pixels);
     }
 }

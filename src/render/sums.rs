@@ -64,23 +64,8 @@ impl Sums {
 
     /// The pixels whose sums are of `count` samples; what is not kept reads as of a miss.
     pub fn pixels(&self, count: u32) -> impl Iterator<Item = Pixel> {
-        self.colors.iter().enumerate().map(move |(pixel, color)| {
-            let hit = self.hits.get(pixel).copied().unwrap_or(FirstHit::NONE);
-            let n = f64::from(count);
-            Pixel {
-                color: Rgba { radiance: color.radiance / n, alpha: color.alpha / n },
-                hit: FirstHit {
-                    normal: hit.normal / n,
-                    shading_normal: hit.shading_normal / n,
-                    albedo: hit.albedo / n,
-                    direct: hit.direct / n,
-                    nodes: hit.nodes / n,
-                    ..hit
-                },
-                variance: variance(color, count),
-                samples: count,
-            }
-        })
+        let hit = |pixel| self.hits.get(pixel).unwrap_or(&FirstHit::NONE);
+        self.colors.iter().enumerate().map(move |(pixel, color)| mean(color, hit(pixel), count))
     }
 
     /// Estimate of the relative error of the mean brightness of pixels of `count` samples: root of the mean variance over
@@ -95,6 +80,35 @@ impl Sums {
     /// Gives the memory back.
     pub fn free(&mut self) {
         (self.colors, self.hits) = (Vec::new(), Vec::new());
+    }
+}
+
+/// The pixel of one sample, what ray `ray` saw: as if it were summed up, for -0 and 0 + -0 are different bits.
+pub(super) fn alone(samples: &Samples, ray: usize) -> Pixel {
+    let (mut color, mut hit) = (Color::default(), FirstHit::NONE);
+    add_color(&mut color, &samples.colors[ray]);
+    if let Some(seen) = samples.hits.get(ray) {
+        add_hit(&mut hit, seen);
+    }
+    mean(&color, &hit, 1)
+}
+
+/// The pixel whose `count` samples add up to these.
+#[inline]
+fn mean(color: &Color, hit: &FirstHit, count: u32) -> Pixel {
+    let n = f64::from(count);
+    Pixel {
+        color: Rgba { radiance: color.radiance / n, alpha: color.alpha / n },
+        hit: FirstHit {
+            normal: hit.normal / n,
+            shading_normal: hit.shading_normal / n,
+            albedo: hit.albedo / n,
+            direct: hit.direct / n,
+            nodes: hit.nodes / n,
+            ..*hit
+        },
+        variance: variance(color, count),
+        samples: count,
     }
 }
 
@@ -152,6 +166,16 @@ mod tests {
         assert_eq!((pixel.hit.distance, pixel.hit.inst, pixel.hit.prim), (3.0, 1, 5));
         // Brightness 1/3, 0, 1/3, 1/3: 1/48 around the mean, over n - 1.
         assert!((pixel.variance - 1.0 / 144.0).abs() < 1e-15 && pixel.samples == 4);
+        let mut sums_of_one = Sums::new(true);
+        sums_of_one.make_room(2);
+        let turned = FirstHit { normal: -DVec3::Z, ..near };
+        let two = Samples { colors: vec![red, Rgba::default()], hits: vec![turned, FirstHit::NONE] };
+        (0..2).for_each(|ray| sums_of_one.add(ray, &two, ray));
+        for (ray, pixel) in sums_of_one.pixels(1).enumerate() {
+            let same = alone(&two, ray);
+            assert_eq!(same, pixel);
+            assert_eq!(same.hit.normal.x.to_bits(), 0);
+        }
         assert!((sums.error(4) - (1.0_f64 / 144.0).sqrt() / 0.25).abs() < 1e-12);
     }
 

@@ -27,9 +27,8 @@ use super::aov::{Aov, Channel};
 use super::canvas::{Canvas, Memory};
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{channels, empty_film};
-use super::pixels::Pixel;
 use super::scheduler::RenderOutput;
-use super::sums::Sums;
+use super::sums::{Sums, alone};
 use super::tally::Tally;
 use crate::camera::{Camera, Tiling};
 use crate::error::{Error, Result, locked};
@@ -224,7 +223,7 @@ impl<'a, S: Real> Progressive<'a, S> {
             if self.canvas.options.spp > 1 {
                 self.keep_first(&memory.pixels, &memory.samples);
             }
-            let pixels: Vec<_> = (0..memory.pixels.len()).map(|ray| Pixel::of_one(&memory.samples, ray)).collect();
+            let pixels: Vec<_> = (0..memory.pixels.len()).map(|ray| alone(&memory.samples, ray)).collect();
             memory.patch.fill(&self.channels, self.window, &memory.pixels, &pixels);
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
