@@ -2,7 +2,9 @@
 
 use super::aov::{Aov, COLOR, Channel, Get};
 use super::pixels::Pixel;
+use super::sums::Finished;
 use crate::film::{Film, Plane, PlaneData, Window};
+use crate::shade::Rgba;
 
 /// The planes of a picture: colour, coverage, and those of `aovs`.
 pub(super) fn channels(aovs: &[Aov]) -> Vec<Channel> {
@@ -28,14 +30,16 @@ pub(super) struct Patch {
     places: Vec<usize>,
     /// Numbers of the pixels that have one.
     kept: Vec<u32>,
+    /// Those pixels, if there are planes besides colours.
+    pixels: Vec<Pixel>,
     /// By channel: the value of each place.
     values: Vec<PlaneData>,
 }
 
 impl Patch {
-    /// Takes the planes' values of those of `pixels` that lie in `window` from `values`, parallel to them, and forgets earlier
-    /// ones; `channels` are the same each time.
-    pub fn fill(&mut self, channels: &[Channel], window: Window, pixels: &[(u32, u32)], values: &[Pixel]) {
+    /// Takes the planes' values of those of `pixels` that lie in `window` from `finished`, parallel to them, and forgets
+    /// earlier ones; `channels` are the same each time.
+    pub fn fill(&mut self, channels: &[Channel], window: Window, pixels: &[(u32, u32)], finished: Finished<'_>) {
         self.places.clear();
         self.kept.clear();
         for (number, &(x, y)) in pixels.iter().enumerate() {
@@ -50,26 +54,31 @@ impl Patch {
                 Get::U32(_) => PlaneData::U32(Vec::new()),
             }));
         }
-        let kept = self.kept.iter().map(|&number| &values[number as usize]);
+        let kept = self.kept.iter().map(|&number| number as usize);
         let (color, further) = self.values.split_at_mut(COLOR.len());
         if let [PlaneData::F32(r), PlaneData::F32(g), PlaneData::F32(b), PlaneData::F32(a)] = color {
             [&mut *r, &mut *g, &mut *b, &mut *a].into_iter().for_each(Vec::clear);
-            for pixel in kept.clone() {
-                r.push(pixel.color.radiance.x as f32);
-                g.push(pixel.color.radiance.y as f32);
-                b.push(pixel.color.radiance.z as f32);
-                a.push(pixel.color.alpha as f32);
+            for Rgba { radiance, alpha } in kept.clone().map(|number| finished.color(number)) {
+                r.push(radiance.x as f32);
+                g.push(radiance.y as f32);
+                b.push(radiance.z as f32);
+                a.push(alpha as f32);
             }
         }
+        if further.is_empty() {
+            return;
+        }
+        self.pixels.clear();
+        self.pixels.extend(kept.map(|number| finished.pixel(number)));
         for (channel, values) in channels[COLOR.len()..].iter().zip(further) {
             match (channel.get, values) {
                 (Get::F32(get), PlaneData::F32(values)) => {
                     values.clear();
-                    values.extend(kept.clone().map(|pixel| get(pixel) as f32));
+                    values.extend(self.pixels.iter().map(|pixel| get(pixel) as f32));
                 }
                 (Get::U32(get), PlaneData::U32(values)) => {
                     values.clear();
-                    values.extend(kept.clone().map(get));
+                    values.extend(self.pixels.iter().map(get));
                 }
                 _ => unreachable!("values are made from the channels"),
             }
@@ -104,7 +113,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::shade::{FirstHit, Rgba};
+    use crate::shade::{FirstHit, Samples};
 
     #[test]
     fn planes_are_named_and_row_major_over_the_window() {
@@ -113,10 +122,10 @@ mod tests {
         let mut film = empty_film((10, 10), window, &channels);
         let color = Rgba { radiance: DVec3::new(1.0, 2.0, 3.0), alpha: 1.0 };
         let hit = FirstHit { distance: 4.0, prim: 9, ..FirstHit::NONE };
-        let pixel = Pixel { color, hit, ..Pixel::EMPTY };
+        let samples = |count| Samples { colors: vec![color; count], hits: vec![hit; count] };
         let mut patch = Patch::default();
-        patch.fill(&channels, window, &[(4, 2)], &[pixel]);
-        patch.fill(&channels, window, &[(5, 3), (7, 3), (5, 4)], &[pixel; 3]);
+        patch.fill(&channels, window, &[(4, 2)], Finished::Samples(&samples(1)));
+        patch.fill(&channels, window, &[(5, 3), (7, 3), (5, 4)], Finished::Samples(&samples(3)));
         patch.paint(&mut film);
         assert_eq!(patch.places(), [4]);
         let names: Vec<&str> = film.planes.iter().map(|p| p.name.as_str()).collect();

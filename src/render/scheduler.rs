@@ -10,8 +10,7 @@ use super::canvas::{Canvas, Memory};
 use super::mattes::{Coverage, Mattes};
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{channels, empty_film};
-use super::pixels::Pixel;
-use super::sums::{Sums, alone};
+use super::sums::{Finished, Sums};
 use super::tally::Tally;
 use crate::camera::Camera;
 use crate::error::{Result, locked};
@@ -245,11 +244,11 @@ impl<S: Real> Job<'_, S> {
 
     /// Takes what the planes get from a finished tile, whose pixels `memory` lists.
     fn fill(&self, tile: &Tile, memory: &mut Memory<S>) {
-        let pixels: Vec<Pixel> = if self.is_of_one_sample() {
-            (0..memory.pixels.len()).map(|ray| alone(&memory.samples, ray)).collect()
+        let finished = if self.is_of_one_sample() {
+            Finished::Samples(&memory.samples)
         } else {
-            tile.sums.pixels(tile.count).collect()
+            Finished::Sums(&tile.sums, tile.count)
         };
-        memory.patch.fill(&self.channels, self.window, &memory.pixels, &pixels);
+        memory.patch.fill(&self.channels, self.window, &memory.pixels, finished);
     }
 }

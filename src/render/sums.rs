@@ -62,12 +62,6 @@ impl Sums {
         }
     }
 
-    /// The pixels whose sums are of `count` samples; what is not kept reads as of a miss.
-    pub fn pixels(&self, count: u32) -> impl Iterator<Item = Pixel> {
-        let hit = |pixel| self.hits.get(pixel).unwrap_or(&FirstHit::NONE);
-        self.colors.iter().enumerate().map(move |(pixel, color)| mean(color, hit(pixel), count))
-    }
-
     /// Estimate of the relative error of the mean brightness of pixels of `count` samples: root of the mean variance over
     /// the mean.
     pub fn error(&self, count: u32) -> f64 {
@@ -83,33 +77,65 @@ impl Sums {
     }
 }
 
-/// The pixel of one sample, what ray `ray` saw: as if it were summed up, for -0 and 0 + -0 are different bits.
-pub(super) fn alone(samples: &Samples, ray: usize) -> Pixel {
-    let (mut color, mut hit) = (Color::default(), FirstHit::NONE);
-    add_color(&mut color, &samples.colors[ray]);
-    if let Some(seen) = samples.hits.get(ray) {
-        add_hit(&mut hit, seen);
-    }
-    mean(&color, &hit, 1)
+/// Where the pixels of a finished batch come from.
+#[derive(Clone, Copy)]
+pub(super) enum Finished<'a> {
+    /// One sample each.
+    Samples(&'a Samples),
+    /// Sums of so many samples. What they do not keep reads as of a miss.
+    Sums(&'a Sums, u32),
 }
 
-/// The pixel whose `count` samples add up to these.
-#[inline]
-fn mean(color: &Color, hit: &FirstHit, count: u32) -> Pixel {
-    let n = f64::from(count);
-    Pixel {
-        color: Rgba { radiance: color.radiance / n, alpha: color.alpha / n },
-        hit: FirstHit {
+impl Finished<'_> {
+    /// Colour of pixel `i`.
+    #[inline]
+    pub fn color(&self, i: usize) -> Rgba {
+        let (sum, count) = self.sum(i);
+        mean(&sum, count)
+    }
+
+    /// Pixel `i`.
+    pub fn pixel(&self, i: usize) -> Pixel {
+        let (sum, count) = self.sum(i);
+        let hit = match self {
+            Self::Samples(samples) => samples.hits.get(i).map(|seen| {
+                let mut hit = FirstHit::NONE;
+                add_hit(&mut hit, seen);
+                hit
+            }),
+            Self::Sums(sums, _) => sums.hits.get(i).copied(),
+        };
+        let (hit, n) = (hit.unwrap_or(FirstHit::NONE), f64::from(count));
+        let hit = FirstHit {
             normal: hit.normal / n,
             shading_normal: hit.shading_normal / n,
             albedo: hit.albedo / n,
             direct: hit.direct / n,
             nodes: hit.nodes / n,
-            ..*hit
-        },
-        variance: variance(color, count),
-        samples: count,
+            ..hit
+        };
+        Pixel { color: mean(&sum, count), hit, variance: variance(&sum, count), samples: count }
     }
+
+    /// Sum number `i`, of a single sample too, for -0 and 0 + -0 are different bits; and of how many.
+    #[inline(always)]
+    fn sum(&self, i: usize) -> (Color, u32) {
+        match self {
+            Self::Samples(samples) => {
+                let mut sum = Color::default();
+                add_color(&mut sum, &samples.colors[i]);
+                (sum, 1)
+            }
+            Self::Sums(sums, count) => (sums.colors[i], *count),
+        }
+    }
+}
+
+/// Mean of the `count` samples in `sum`.
+#[inline(always)]
+fn mean(sum: &Color, count: u32) -> Rgba {
+    let n = f64::from(count);
+    Rgba { radiance: sum.radiance / n, alpha: sum.alpha / n }
 }
 
 #[inline]
@@ -161,7 +187,7 @@ mod tests {
         let mut sums = Sums::new(true);
         sums.make_room(1);
         (0..4).for_each(|ray| sums.add(0, &samples, ray));
-        let pixel = sums.pixels(4).next().unwrap();
+        let pixel = Finished::Sums(&sums, 4).pixel(0);
         assert_eq!((pixel.color.radiance, pixel.color.alpha, pixel.hit.nodes), (DVec3::X * 0.75, 0.75, 4.0));
         assert_eq!((pixel.hit.distance, pixel.hit.inst, pixel.hit.prim), (3.0, 1, 5));
         // Brightness 1/3, 0, 1/3, 1/3: 1/48 around the mean, over n - 1.
@@ -171,9 +197,9 @@ mod tests {
         let turned = FirstHit { normal: -DVec3::Z, ..near };
         let two = Samples { colors: vec![red, Rgba::default()], hits: vec![turned, FirstHit::NONE] };
         (0..2).for_each(|ray| sums_of_one.add(ray, &two, ray));
-        for (ray, pixel) in sums_of_one.pixels(1).enumerate() {
-            let same = alone(&two, ray);
-            assert_eq!(same, pixel);
+        for ray in 0..2 {
+            let (same, pixel) = (Finished::Samples(&two).pixel(ray), Finished::Sums(&sums_of_one, 1).pixel(ray));
+            assert_eq!((same, same.color), (pixel, Finished::Samples(&two).color(ray)));
             assert_eq!(same.hit.normal.x.to_bits(), 0);
         }
         assert!((sums.error(4) - (1.0_f64 / 144.0).sqrt() / 0.25).abs() < 1e-12);
@@ -191,7 +217,8 @@ mod tests {
         let mut sums = Sums::new(false);
         sums.make_room(1024);
         sums.add_passes(passes, &samples);
-        for (i, pixel) in sums.pixels(3).enumerate() {
+        for i in 0..1024 {
+            let pixel = Finished::Sums(&sums, 3).pixel(i);
             assert_eq!((pixel.color.radiance, pixel.hit), (DVec3::new(i as f64, 1.0, 0.0), FirstHit::NONE));
         }
     }

@@ -97,8 +97,9 @@ mod tests {
     use glam::DVec3;
 
     use super::super::super::patch::{channels, empty_film};
-    use super::super::super::pixels::Pixel;
+    use super::super::super::sums::Finished;
     use super::*;
+    use crate::shade::{Rgba, Samples};
 
     #[test]
     fn the_smallest_block_with_a_colour_is_shown() {
@@ -107,9 +108,9 @@ mod tests {
         let mut frame = Framebuffer::new(empty_film((20, 20), window, &channels), 8);
         let mut patch = Patch::default();
         let mut put = |frame: &mut Framebuffer, pixel, value| {
-            let mut gray = Pixel::EMPTY;
-            gray.color.radiance = DVec3::splat(value);
-            patch.fill(&channels, window, &[pixel], &[gray]);
+            let gray = Rgba { radiance: DVec3::splat(value), alpha: 1.0 };
+            let samples = Samples { colors: vec![gray], hits: Vec::new() };
+            patch.fill(&channels, window, &[pixel], Finished::Samples(&samples));
             frame.paint(&patch);
         };
         assert_eq!((frame.shown(3, 5), frame.left()), (None, 81));

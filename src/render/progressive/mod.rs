@@ -28,7 +28,7 @@ use super::canvas::{Canvas, Memory};
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{channels, empty_film};
 use super::scheduler::RenderOutput;
-use super::sums::{Sums, alone};
+use super::sums::{Finished, Sums};
 use super::tally::Tally;
 use crate::camera::{Camera, Tiling};
 use crate::error::{Error, Result, locked};
@@ -223,8 +223,7 @@ impl<'a, S: Real> Progressive<'a, S> {
             if self.canvas.options.spp > 1 {
                 self.keep_first(&memory.pixels, &memory.samples);
             }
-            let pixels: Vec<_> = (0..memory.pixels.len()).map(|ray| alone(&memory.samples, ray)).collect();
-            memory.patch.fill(&self.channels, self.window, &memory.pixels, &pixels);
+            memory.patch.fill(&self.channels, self.window, &memory.pixels, Finished::Samples(&memory.samples));
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
             self.told(watch, frame, lattice.part(batch), memory)
@@ -272,8 +271,7 @@ impl<'a, S: Real> Progressive<'a, S> {
                 tile.sums.add_passes(passes, &memory.samples);
                 tile.samples += passes.count();
             }
-            let pixels: Vec<_> = tile.sums.pixels(samples).collect();
-            memory.patch.fill(&self.channels, self.window, &memory.pixels, &pixels);
+            memory.patch.fill(&self.channels, self.window, &memory.pixels, Finished::Sums(&tile.sums, samples));
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
             if samples == self.canvas.options.spp {
