@@ -28,8 +28,7 @@ use crate::trace::{Engine, Scratch};
 /// Rays of one cost measurement: in Morton order 16 consecutive rays are a block of 4 x 4 pixels.
 const COST_BLOCK: usize = 16;
 
-/// Samples of a tile whose paths are traced together. With tiles of 32 x 32 pixels that is some hundred bytes times
-/// 8192, which still fits a core's second cache.
+/// Samples of a tile whose paths are traced together, at most: the fastest of 1, 2, 4 and 8 (results/NOTES.md).
 const PASSES: u32 = 8;
 
 /// What an integrator may vary.
