@@ -13,6 +13,7 @@ mod glow;
 mod integrator;
 mod lights;
 mod look;
+mod look_lanes;
 mod meeting;
 mod offset;
 mod path;

@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::classic::Classic;
 use super::integrator::Integrator;
 use super::look::Looks;
+use super::look_lanes::{LookNumbers, numbers_of_sides};
 use super::meeting::Meeting;
 use super::path::{PathMemory, Paths};
 use super::rt::Rt;
@@ -122,6 +123,8 @@ pub struct Shader<'a, S: Real> {
     pub(super) ao_length: f64,
     pub(super) looks: Arc<Looks<'a>>,
     pub(super) meeting: Meeting<S>,
+    /// What the sides of materials scatter with, as [`Looks::sides`] lists them.
+    pub(super) sides: Vec<LookNumbers<S>>,
     rt: Option<Rt>,
     paths: Option<Paths<'a, S>>,
 }
@@ -146,6 +149,7 @@ impl<'a, S: Real> Shader<'a, S> {
         } else {
             Meeting::none()
         };
+        let sides = numbers_of_sides(&looks);
         let lights = if description.lights.is_empty() { vec![default_light] } else { description.lights.clone() };
         Self {
             world,
@@ -156,6 +160,7 @@ impl<'a, S: Real> Shader<'a, S> {
             environment: description.environment.as_ref(),
             looks,
             ambient: description.ambient,
+            sides,
             settings,
             ao_length: if ao_length.is_nan() { f64::INFINITY } else { ao_length },
             meeting,

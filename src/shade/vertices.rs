@@ -4,12 +4,13 @@
 use glam::DVec3;
 
 use super::classic::{Classic, Terms};
-use super::look::{Look, Model};
+use super::look::Model;
+use super::look_lanes::LookLanes;
 use super::meeting::{Met, met_lanes};
 use super::offset::position_error;
 use super::shader::Shader;
 use crate::lanes::chosen::{self, lanes_of};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each};
 use crate::ray::{Hits, Rays};
 use crate::scene::world::Surface;
 
@@ -211,24 +212,17 @@ impl<S: Real> Shader<'_, S> {
         if lanes == 0 {
             return;
         }
-        let look_of = |lane: usize| self.looks.even(material[lane], front >> lane & 1 != 0);
         let dir: Lanes3<S::Wide> = each(|axis| S::Wide::load(&rays.dir[axis][first..]));
         let cos = dot(vertices.vector::<S::Wide>(NORMAL, first), dir).abs() / dot(dir, dir).sqrt();
         let cos = cos.fast_min(S::Wide::constant(1.0));
-        let lead = lanes.trailing_zeros() as usize;
-        let is_one = lanes_of(lanes).all(|lane| material[lane] == material[lead])
-            && (front & lanes == 0 || front & lanes == lanes);
-        if is_one {
-            let Some(look) = look_of(lead) else { return };
-            let base = map3(look.base.to_array(), S::Wide::constant);
-            let param = vectors(|k| S::Wide::constant(look.param[k]));
-            self.put_terms(look.model, base, &param, cos, (first, lanes), vertices);
-            return;
+        let (mut sides, mut of_model) = ([0; MAX_LANES], [0u32; Model::COUNT]);
+        for lane in lanes_of(lanes) {
+            let Some((side, model)) = self.looks.even_side(material[lane], front >> lane & 1 != 0) else { continue };
+            sides[lane] = side;
+            of_model[model as usize] |= 1 << lane;
         }
-        let mut columns = Columns::<S>::new();
-        lanes_of(lanes).for_each(|lane| look_of(lane).into_iter().for_each(|look| columns.set(lane, look)));
-        let (base, param) = (each(|c| S::Wide::load(&columns.base[c])), vectors(|k| S::Wide::load(&columns.param[k])));
-        for (model, lanes) in Model::ALL.into_iter().zip(columns.lanes).filter(|(_, lanes)| *lanes != 0) {
+        let LookLanes { base, param } = LookLanes::<S::Wide>::of([&self.sides, &[]], lanes, &sides);
+        for (model, lanes) in Model::ALL.into_iter().zip(of_model).filter(|(_, lanes)| *lanes != 0) {
             self.put_terms(model, base, &param, cos, (first, lanes), vertices);
         }
     }
@@ -250,36 +244,5 @@ impl<S: Real> Shader<'_, S> {
         vertices.put_some(lanes, ETA, first, [eta]);
         // What is the same everywhere has no texture of what the ambient light reaches.
         vertices.put_some(lanes, AMBIENT, first, [S::Wide::constant(1.0)]);
-    }
-}
-
-/// `f` of each parameter; written out, because `map` becomes a call.
-#[inline(always)]
-fn vectors<V: Lanes>(f: impl Fn(usize) -> V) -> [V; 7] {
-    let mut list = [V::constant(0.0); 7];
-    for (k, x) in list.iter_mut().enumerate() {
-        *x = f(k);
-    }
-    list
-}
-
-/// Looks of lanes.
-struct Columns<S> {
-    base: [[S; MAX_LANES]; 3],
-    param: [[S; MAX_LANES]; 7],
-    /// Lanes of each model.
-    lanes: [u32; Model::COUNT],
-}
-
-impl<S: Real> Columns<S> {
-    fn new() -> Self {
-        Self { base: [[S::ZERO; MAX_LANES]; 3], param: [[S::ZERO; MAX_LANES]; 7], lanes: [0; Model::COUNT] }
-    }
-
-    #[inline(always)]
-    fn set(&mut self, lane: usize, look: &Look) {
-        (0..3).for_each(|axis| self.base[axis][lane] = S::from_f64(look.base[axis]));
-        (0..7).for_each(|k| self.param[k][lane] = S::from_f64(look.param[k]));
-        self.lanes[look.model as usize] |= 1 << lane;
     }
 }

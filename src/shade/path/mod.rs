@@ -37,10 +37,11 @@ use self::bsdf::{
     Matte, MetalRough, RoughCoat, RoughConductor, RoughDielectric, SmoothCoat, SmoothConductor, SmoothDielectric, Thin,
 };
 use self::lights::Lights;
-use self::points::{LookNumbers, Places, Points, look_numbers};
+use self::points::{Places, Points};
 use self::scatter::{Arrivals, Chances};
 use self::wave::{Shadows, Wave};
 use super::look::{Looks, Model};
+use super::look_lanes::{LookNumbers, look_numbers, numbers_of_sides};
 use super::meeting::{Meeting, Met, met_lanes};
 use super::offset::position_error;
 use super::sample::Samples;
@@ -120,7 +121,7 @@ impl<'a, S: Real> Paths<'a, S> {
         let shadow_end = S::from_f64(1.0 - SHADOW_ROUNDINGS * S::EPSILON.to_f64());
         let Settings { depth, seed, .. } = *settings;
         let meeting = Meeting::new(world, &looks, settings.rays);
-        let sides = looks.sides().map(|look| look_numbers(look.base, &look.param)).collect();
+        let sides = numbers_of_sides(&looks);
         Self { world, engine, looks, lights, facets, depth, seed, shadow_end, meeting, sides }
     }
 

@@ -4,51 +4,9 @@
 use glam::DVec3;
 
 use super::wave::at_least;
-use crate::lanes::chosen::{Picked, records};
-use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
+use crate::lanes::chosen::Picked;
+use crate::lanes::{Lanes, Lanes3, Real};
 use crate::shade::place::Place;
-
-/// Numbers of a look: base colour, seven parameters.
-pub const NUMBERS: usize = 10;
-
-/// What a point scatters with, but for the model.
-pub type LookNumbers<S> = [S; NUMBERS];
-
-/// `base` and `param` in one list.
-#[inline]
-pub fn look_numbers<S: Real>(base: DVec3, param: &[f64; 7]) -> LookNumbers<S> {
-    let mut numbers = [S::ZERO; NUMBERS];
-    let all = base.to_array().into_iter().chain(*param);
-    numbers.iter_mut().zip(all).for_each(|(to, from)| *to = S::from_f64(from));
-    numbers
-}
-
-/// What the points of a packet scatter with, but for the model.
-#[derive(Clone, Copy, Debug)]
-pub struct LookLanes<V> {
-    /// Base colour.
-    pub base: Lanes3<V>,
-    /// Parameters of the model.
-    pub param: [V; 7],
-}
-
-impl<V: Lanes> LookLanes<V> {
-    /// Of points that look like the entries `which`, at most `N` of them, of two lists as one.
-    #[inline(always)]
-    pub fn of([list, more]: [&[LookNumbers<V::Scalar>]; 2], which: &[u32]) -> Self {
-        let entry = |k: u32| list.get(k as usize).unwrap_or_else(|| &more[k as usize - list.len()]);
-        let mut key = [0; MAX_LANES];
-        key.iter_mut().zip(which).for_each(|(key, &which)| *key = which);
-        let [r, g, b, p0, p1, p2, p3, p4, p5, p6] = records((1 << which.len()) - 1, &key, entry);
-        Self { base: [r, g, b], param: [p0, p1, p2, p3, p4, p5, p6] }
-    }
-
-    /// Three parameters from number `k` on.
-    #[inline(always)]
-    pub fn three(&self, k: usize) -> Lanes3<V> {
-        [self.param[k], self.param[k + 1], self.param[k + 2]]
-    }
-}
 
 /// Points of one model.
 #[derive(Clone, Debug, Default)]

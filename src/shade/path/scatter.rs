@@ -2,12 +2,13 @@
 
 use super::Paths;
 use super::bsdf::Bsdf;
-use super::points::{LookLanes, LookNumbers, PlaceLanes, Places, Points};
+use super::points::{PlaceLanes, Places, Points};
 use super::wave::{Shadows, Wave};
 use crate::camera::sobol::fraction;
 use crate::lanes::chosen::{Chosen, Picked};
 use crate::lanes::space::{Frame, choose, normalize};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, map3};
+use crate::shade::look_lanes::{LookLanes, LookNumbers};
 use crate::shade::spot::Draw;
 
 /// Bounces before paths may end by chance.
@@ -146,11 +147,11 @@ impl<S: Real> Paths<'_, S> {
             for (lane, &[ray, look]) in chunk.iter().enumerate().take(MAX_LANES) {
                 (path[lane], rays[lane], looks[lane]) = (arrivals.wave.path[ray as usize], ray, look);
             }
-            let [path, rays, looks] = [&path, &rays, &looks].map(|list| &list[..chunk.len()]);
+            let [path, rays] = [&path, &rays].map(|list| &list[..chunk.len()]);
             let numbers = chances.numbers::<S>(path, aims);
             let packet =
                 Packet::load(arrivals, &Picked::of::<S::Wide>(rays, arrivals.wave.rays.padded_len()), chances.bounce);
-            let bsdf = B::load(&LookLanes::of(arrivals.looks, looks), &self.facets);
+            let bsdf = B::load(&LookLanes::of(arrivals.looks, (1 << chunk.len()) - 1, &looks), &self.facets);
             if aims {
                 self.aim(&packet, &bsdf, path, &numbers, shadows);
             }

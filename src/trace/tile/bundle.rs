@@ -203,18 +203,13 @@ impl<'a> Bundle<'a> {
         }
     }
 
-    /// The way of one ray.
+    /// The way of one of the `rays` in memory.
     #[inline(always)]
-    pub fn way(&self, g: usize, lane: usize) -> [f32; 3] {
-        match self.source {
-            Source::Batch(rays) => {
-                let ray = self.first + g * V::N + lane;
-                match self.shared {
-                    Shared::Start => rays.dir(ray),
-                    Shared::End(_) => each(|a| rays.org[a][ray] - self.apex[a]),
-                }
-            }
-            Source::Pencil(..) => map3(self.ways(g), |x| x.to_array()[lane]),
+    pub fn way(&self, rays: &Rays<f32>, g: usize, lane: usize) -> [f32; 3] {
+        let ray = self.first + g * V::N + lane;
+        match self.shared {
+            Shared::Start => rays.dir(ray),
+            Shared::End(_) => each(|a| rays.org[a][ray] - self.apex[a]),
         }
     }
 

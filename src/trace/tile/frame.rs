@@ -11,6 +11,7 @@ use super::bundle::{Bundle, Source};
 use super::{Mask, SET, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::math::Aabb;
+use crate::ray::Rays;
 
 /// Scales of scenes the tile's arithmetic is made for: products of three coordinates, scaled, stay normal numbers.
 const EXPONENTS: std::ops::RangeInclusive<i32> = -60..=60;
@@ -40,12 +41,15 @@ impl Frame {
             return None;
         }
         let scale = f32::from_bits(((127 - exponent) as u32) << 23);
-        if let Source::Pencil(pencil, [s, t]) = bundle.source {
-            let [u, v, a] = pencil.axes;
-            let axes = [each(|x| u[x] - s * a[x]), each(|x| v[x] - t * a[x]), a];
-            return Some(Self { apex, axes: map3(axes, |axis| axis.map(|x| x as f32 * scale)), scale, extent });
-        }
-        let (sum, across) = Self::mean_direction::<N>(bundle, groups);
+        let rays = match bundle.source {
+            Source::Batch(rays) => rays,
+            Source::Pencil(pencil, [s, t]) => {
+                let [u, v, a] = pencil.axes;
+                let axes = [each(|x| u[x] - s * a[x]), each(|x| v[x] - t * a[x]), a];
+                return Some(Self { apex, axes: map3(axes, |axis| axis.map(|x| x as f32 * scale)), scale, extent });
+            }
+        };
+        let (sum, across) = Self::mean_direction::<N>(bundle, rays, groups);
         let a = normalised(sum)?;
         let flat = |r: [f64; 3]| sub(r, a.map(|x| x * dot(r, a)));
         // One direction, or directions on a line through the apex: any perpendicular axis does.
@@ -62,7 +66,7 @@ impl Frame {
     /// The order of rays in a block (Morton) says what is left; where it is another order, nothing but the fit of
     /// the rectangles gets worse.
     #[inline(always)]
-    fn mean_direction<const N: usize>(bundle: &Bundle, groups: u64) -> ([f64; 3], [f64; 3]) {
+    fn mean_direction<const N: usize>(bundle: &Bundle, rays: &Rays<f32>, groups: u64) -> ([f64; 3], [f64; 3]) {
         let mut sample: Lanes3<[f32; SET]> = Default::default();
         // One group alone is sampled whole, else every `N`th group by its first lane.
         let single = groups.is_power_of_two().then(|| groups.trailing_zeros() as usize);
@@ -76,7 +80,7 @@ impl Frame {
                 continue;
             }
             used |= 1 << i;
-            let way = bundle.way(g, lane);
+            let way = bundle.way(rays, g, lane);
             for axis in 0..3 {
                 sample[axis][i] = way[axis];
             }

@@ -16,7 +16,7 @@ use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, brightness, fresnel, mirrored, only, ratio};
 use crate::lanes::space::{add, choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
-use crate::shade::path::points::LookLanes;
+use crate::shade::look_lanes::LookLanes;
 
 /// The base under its coat.
 struct Base<V> {

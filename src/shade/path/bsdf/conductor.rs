@@ -9,7 +9,7 @@ use super::warp::{grazing, grazing_pdf};
 use super::{Bsdf, Sampled, Value, fresnel, mirrored, none, only, ratio};
 use crate::lanes::space::{add, choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
-use crate::shade::path::points::LookLanes;
+use crate::shade::look_lanes::LookLanes;
 
 /// A packet of complex indices of refraction.
 struct Metal<V> {

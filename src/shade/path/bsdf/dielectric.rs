@@ -9,7 +9,7 @@ use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, conductor::reflected, fresnel, mirrored, none, ratio};
 use crate::lanes::space::{choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
-use crate::shade::path::points::LookLanes;
+use crate::shade::look_lanes::LookLanes;
 
 /// A smooth boundary.
 pub struct SmoothDielectric<V> {

@@ -7,7 +7,7 @@ use super::warp::cosine;
 use super::{Bsdf, Sampled, Value, brightness, mirrored, only, ratio};
 use crate::lanes::space::choose;
 use crate::lanes::{Lanes, Lanes3};
-use crate::shade::path::points::LookLanes;
+use crate::shade::look_lanes::LookLanes;
 
 /// A packet of them.
 pub struct Matte<V> {

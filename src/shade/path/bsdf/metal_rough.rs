@@ -16,7 +16,7 @@ use super::warp::{cosine, grazing, grazing_pdf};
 use super::{Bsdf, Sampled, Value, brightness, fresnel, only, ratio};
 use crate::lanes::space::{add, choose, normalize};
 use crate::lanes::{Lanes, Lanes3, dot};
-use crate::shade::path::points::LookLanes;
+use crate::shade::look_lanes::LookLanes;
 
 /// A packet of them.
 pub struct MetalRough<V> {

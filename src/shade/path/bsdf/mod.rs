@@ -18,8 +18,8 @@ mod thin;
 pub(super) mod warp;
 
 use self::facets::FacetsList;
-use super::points::LookLanes;
 use crate::lanes::{Lanes, Lanes3};
+use crate::shade::look_lanes::LookLanes;
 
 pub(super) use coat::{RoughCoat, SmoothCoat};
 pub(super) use conductor::{RoughConductor, SmoothConductor};

@@ -13,14 +13,14 @@ use super::{
 };
 use crate::camera::sobol::PixelPoints;
 use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
-use crate::shade::path::points::{LookLanes, look_numbers};
+use crate::shade::look_lanes::{LookLanes, look_numbers};
 
 /// Base colour and parameters of one point.
 type Params = ([f64; 3], [f64; 7]);
 
 /// The same look in all lanes.
 fn everywhere<V: Lanes>((base, param): &Params) -> LookLanes<V> {
-    LookLanes::of([&[look_numbers((*base).into(), param)], &[]], &[0; MAX_LANES][..V::N])
+    LookLanes::of([&[look_numbers((*base).into(), param)], &[]], V::ALL, &[0; MAX_LANES])
 }
 
 const COPPER: [f64; 6] = [0.21, 0.93, 1.1, 3.6, 2.6, 2.3];
@@ -301,12 +301,12 @@ fn lanes_are_alone<S: Real, W: Bsdf<'static, S::Wide>, B: Bsdf<'static, S>>(name
         let vector = |f: &dyn Fn(usize) -> [S; 3]| -> Lanes3<S::Wide> { [0, 1, 2].map(|c| load(&|lane| f(lane)[c])) };
         let (wo, wi) = (|lane| direction(lane, 0, 1e-3), |lane| direction(lane, 1, -1.0));
         let all: [u32; MAX_LANES] = std::array::from_fn(|lane| lane as u32);
-        let wide = W::load(&LookLanes::of([&table[..3], &table[3..]], &all[..width]), &FACETS);
+        let wide = W::load(&LookLanes::of([&table[..3], &table[3..]], <S::Wide as Lanes>::ALL, &all), &FACETS);
         let place = [load(&|lane| number(lane, 2)[0]), load(&|lane| number(lane, 2)[1])];
         let value = wide.eval(vector(&wo), vector(&wi));
         let sampled = wide.sample(vector(&wo), place, load(&|lane| number(lane, 3)[0]));
         for lane in 0..width {
-            let narrow = B::load(&LookLanes::of([&table[..3], &table[3..]], &all[lane..=lane]), &FACETS);
+            let narrow = B::load(&LookLanes::of([&table[..3], &table[3..]], 1, &[lane as u32; MAX_LANES]), &FACETS);
             let (v, s) =
                 (narrow.eval(wo(lane), wi(lane)), narrow.sample(wo(lane), number(lane, 2), number(lane, 3)[0]));
             let all = (0..3).all(|c| {

@@ -5,7 +5,7 @@ use super::matte::infinity;
 use super::{Bsdf, Sampled, Value, fresnel, mirrored, none};
 use crate::lanes::space::choose;
 use crate::lanes::{Lanes, Lanes3};
-use crate::shade::path::points::LookLanes;
+use crate::shade::look_lanes::LookLanes;
 
 /// A packet of them.
 pub struct Thin<V> {
