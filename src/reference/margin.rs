@@ -104,12 +104,7 @@ impl Located<'_> {
     /// to nothing for an f32 engine; an f64 engine's own rounding is of this size. 0 if the line does not cross.
     pub fn blur(&self, ray: &OracleRay) -> f64 {
         let crossed = self.triangle().filter(|_| self.crossings(ray)[0].is_some());
-        crossed.map_or(0.0, |[p0, p1, p2]| {
-            let (e1, e2) = (p1 - p0, p2 - p0);
-            // Beyond the third edge both weights' errors add up, and one unit of u + v is |ng| / |third edge| long.
-            let third = (e1.length() + e2.length()) / (p2 - p1).length();
-            2.0 * shapes::fatness(p0, shapes::cross(e1, e2), ray.org, ray.dir) * third
-        })
+        crossed.map_or(0.0, |corners| shapes::blur(corners, ray.org, ray.dir))
     }
 
     /// Sine of the angle between the ray and the surface at a crossing.
@@ -311,7 +306,7 @@ fn edges([p0, p1, p2]: [DVec3; 3]) -> [(DVec3, DVec3); 3] {
 }
 
 /// Distance of a point to a proper triangle.
-fn point_to_triangle(p: DVec3, corners: [DVec3; 3]) -> f64 {
+pub(super) fn point_to_triangle(p: DVec3, corners: [DVec3; 3]) -> f64 {
     let ng = shapes::cross(corners[1] - corners[0], corners[2] - corners[0]);
     let rim = edges(corners).map(|(a, b)| point_to_segment(p, a, b)).into_iter().fold(f64::INFINITY, f64::min);
     let above = edges(corners).iter().all(|&(a, b)| shapes::cross(b - a, p - a).dot(ng) >= 0.0);

@@ -62,8 +62,16 @@ pub(super) fn triangle_plane([p0, p1, p2]: [DVec3; 3], org: DVec3, dir: DVec3) -
     (det.abs() > PARALLEL * dir.length() * ng.length()).then_some(hit)
 }
 
+/// How far a triangle that a line crosses is seen beyond its edges, at most: the errors of both weights add up beyond the
+/// third edge, where one unit of u + v is |ng| / |third edge| long.
+pub(super) fn blur([p0, p1, p2]: [DVec3; 3], org: DVec3, dir: DVec3) -> f64 {
+    let (e1, e2) = (p1 - p0, p2 - p0);
+    let third = (e1.length() + e2.length()) / (p2 - p1).length();
+    2.0 * fatness(p0, cross(e1, e2), org, dir) * third
+}
+
 /// How far a triangle reaches beyond its edges, in its plane, for a line that crosses it.
-pub(super) fn fatness(p0: DVec3, ng: DVec3, org: DVec3, dir: DVec3) -> f64 {
+fn fatness(p0: DVec3, ng: DVec3, org: DVec3, dir: DVec3) -> f64 {
     FAT * (org - p0).length() * (dir.length() * ng.length()) / dir.dot(ng).abs()
 }
 

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::span::{Solid, Span, infinite, nearest_to_origin};
+use super::span::{Solid, Span, infinite, nearest_to_vertex};
 use crate::lanes::{Lanes, Lanes3, Real};
 
 /// The canonical cone. `param` is the radius at z = 1, `0 <= top < 1`. Faces: 0 side, 1 cap at z = 0, 2 cap at
@@ -17,21 +17,24 @@ impl Solid for Cone {
 
     #[inline(always)]
     fn span<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, top: V::Scalar) -> Span<V> {
-        let (o, shift) = nearest_to_origin(o, d);
         let zero = V::constant(0.0);
         // Inside the double cone: f(t) = a t^2 + 2 b t + c <= 0, with radius r(z) = 1 - slope z.
         let slope = V::splat(V::Scalar::ONE - top);
-        let radius = V::constant(1.0) - slope * o[2];
         let fall = slope * d[2];
+        let radius = |o: Lanes3<V>| V::constant(1.0) - slope * o[2];
+        let half_slope = |o: Lanes3<V>| o[0].mul_add(d[0], o[1] * d[1]) + fall * radius(o);
         let a = d[0].mul_add(d[0], d[1] * d[1]) - fall * fall;
-        let b = o[0].mul_add(d[0], o[1] * d[1]) + fall * radius;
+        let (o, shift) = nearest_to_vertex(o, d, a, half_slope);
+        let (b, radius) = (half_slope(o), radius(o));
         let c = o[0].mul_add(o[0], o[1] * o[1]) - radius * radius;
         let disc = b.mul_add(b, -(a * c));
         let steep = a.cmp_lt(zero);
         // A line steeper than the cone always crosses it; only rounding can say otherwise.
         let root = disc.fast_max(zero).sqrt();
         let q = V::select(b.cmp_lt(zero), root - b, -(b + root));
-        let (r0, r1) = (q / a, c / q);
+        // Through the tip both roots are one, and all of b, c and q may be 0.
+        let r0 = q / a;
+        let r1 = V::select(q.cmp_eq(zero), r0, c / q);
         let (first, second) = (r0.fast_min(r1), r0.fast_max(r1));
         // A steep line is inside before its first root or after its second, each in one nappe; the nappe that the
         // slab leaves is the one on the side of decreasing z.

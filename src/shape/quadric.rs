@@ -6,37 +6,46 @@
 
 use glam::DVec3;
 
-use super::span::{Span, infinite, nearest_to_origin};
+use super::span::{Span, infinite, nearest_to_vertex};
 use crate::lanes::{LaneMask, Lanes, Lanes3};
 
 /// Spans of lines inside x^2 + y^2 <= g(z), 0 <= z <= 1; g by its coefficients of 1, z, z^2.
 #[inline(always)]
-pub fn round<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, g: [V::Scalar; 3], mut emit: impl FnMut(Span<V>)) {
-    let (o, shift) = nearest_to_origin(o, d);
-    let ends = Span::unit_slab(o[2], d[2]);
-    let squares = [d[0].mul_add(d[0], d[1] * d[1]), o[0].mul_add(d[0], o[1] * d[1]), o[0].mul_add(o[0], o[1] * o[1])];
-    pieces(squares, o[2], d[2], g, |side| emit(side.intersect(&ends).shifted(shift)));
+pub fn round<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, g: [V::Scalar; 3], emit: impl FnMut(Span<V>)) {
+    let product = |p: Lanes3<V>, q: Lanes3<V>| p[0].mul_add(q[0], p[1] * q[1]);
+    pieces(o, d, g, product, |o| Span::unit_slab(o[2], d[2]), emit);
 }
 
 /// Spans of lines inside y^2 <= g(z), |x| <= 1, 0 <= z <= 1.
 #[inline(always)]
-pub fn trough<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, g: [V::Scalar; 3], mut emit: impl FnMut(Span<V>)) {
-    let (o, shift) = nearest_to_origin(o, d);
-    let sides = Span::slab(o[0], d[0], [V::constant(-1.0), V::constant(1.0)], [3.0, 4.0]);
-    let ends = Span::unit_slab(o[2], d[2]).intersect(&sides);
-    let squares = [d[1] * d[1], o[1] * d[1], o[1] * o[1]];
-    pieces(squares, o[2], d[2], g, |side| emit(side.intersect(&ends).shifted(shift)));
+pub fn trough<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, g: [V::Scalar; 3], emit: impl FnMut(Span<V>)) {
+    let ends = |o: Lanes3<V>| {
+        let sides = Span::slab(o[0], d[0], [V::constant(-1.0), V::constant(1.0)], [3.0, 4.0]);
+        Span::unit_slab(o[2], d[2]).intersect(&sides)
+    };
+    pieces(o, d, g, |p, q| p[1] * q[1], ends, emit);
 }
 
-/// Spans where the square of the distance to the axis, `squares` = (d^2, o d, o^2), is at most g(z).
+/// Spans between the ends where the square of the distance to the axis is at most g(z). `product`: of two vectors' parts
+/// across the axis; `ends`: the piece of a line from a point of it that is between them.
 #[inline(always)]
-fn pieces<V: Lanes>(squares: [V; 3], oz: V, dz: V, g: [V::Scalar; 3], mut emit: impl FnMut(Span<V>)) {
+fn pieces<V: Lanes>(
+    o: Lanes3<V>,
+    d: Lanes3<V>,
+    g: [V::Scalar; 3],
+    product: impl Fn(Lanes3<V>, Lanes3<V>) -> V,
+    ends: impl Fn(Lanes3<V>) -> Span<V>,
+    mut emit: impl FnMut(Span<V>),
+) {
     let zero = V::constant(0.0);
     let [g0, g1, g2] = g.map(V::splat);
     // f(t) = a t^2 + 2 b t + c <= 0.
-    let a = squares[0] - g2 * (dz * dz) + zero;
-    let b = squares[1] - V::constant(0.5) * (g1 * dz) - g2 * (oz * dz);
-    let c = squares[2] - g2.mul_add(oz, g1).mul_add(oz, g0);
+    let a = product(d, d) - g2 * (d[2] * d[2]) + zero;
+    let half_slope = |o: Lanes3<V>| product(o, d) - V::constant(0.5) * (g1 * d[2]) - g2 * (o[2] * d[2]);
+    let (o, shift) = nearest_to_vertex(o, d, a, half_slope);
+    let ends = ends(o);
+    let b = half_slope(o);
+    let c = product(o, o) - g2.mul_add(o[2], g1).mul_add(o[2], g0);
     let disc = b.mul_add(b, -(a * c));
     let root = disc.fast_max(zero).sqrt();
     let q = V::select(b.cmp_lt(zero), root - b, -(b + root));
@@ -51,9 +60,10 @@ fn pieces<V: Lanes>(squares: [V; 3], oz: V, dz: V, g: [V::Scalar; 3], mut emit: 
     let whole = !crossed & V::select(level, c, a).cmp_le(zero) & (opens | level);
     let t_in = V::select(whole | outside, forever, first);
     let t_out = V::select(whole, infinite(), V::select(outside, first, second));
-    emit(Span::plain(crossed | whole, t_in, t_out));
+    let mut between = |side: Span<V>| emit(side.intersect(&ends).shifted(shift));
+    between(Span::plain(crossed | whole, t_in, t_out));
     if outside.any() {
-        emit(Span::plain(outside, second, infinite()));
+        between(Span::plain(outside, second, infinite()));
     }
 }
 

@@ -107,11 +107,6 @@ trait Convex: Solid {
     fn depth(p: DVec3, param: f64) -> f64 {
         Self::faces(p, param).into_iter().fold(f64::NEG_INFINITY, f64::max)
     }
-
-    /// How far a surface near `p` may be off if the numbers of the solid's equation are off by `tol`.
-    fn slack(_p: DVec3, _param: f64, tol: f64) -> f64 {
-        tol
-    }
 }
 
 impl Convex for Sphere {
@@ -136,13 +131,6 @@ impl Convex for Cone {
     fn faces(p: DVec3, top: f64) -> Vec<f64> {
         vec![p.x.hypot(p.y) - (1.0 - (1.0 - top) * p.z), -p.z, p.z - 1.0]
     }
-
-    /// The equation is rho^2 - r^2 = (rho - r)(rho + r): at the apex the second factor vanishes and a rounding
-    /// counts with its square root, as at any double root.
-    fn slack(p: DVec3, top: f64, tol: f64) -> f64 {
-        let sum = p.x.hypot(p.y) + (1.0 - (1.0 - top) * p.z).abs();
-        (tol / sum).min(tol.sqrt()).max(tol)
-    }
 }
 
 /// The deepest point of a line inside a solid: parameter and depth (ternary search of a convex function).
@@ -163,24 +151,23 @@ fn deepest<K: Convex>(local: Ray, param: f64) -> (f64, f64) {
 fn judge<K: Convex>(local: Ray, param: f64, piece: &Piece, tol: f64) -> bool {
     let at = |t: f64| local.0 + local.1 * t;
     let (bottom, depth) = deepest::<K>(local, param);
-    let slack = K::slack(at(bottom), param, tol);
     let Some([(t_in, face_in), (t_out, face_out)]) = piece.span else {
-        assert!(depth > -slack, "missed, though {depth:e} deep: {local:?}");
+        assert!(depth > -tol, "missed, though {depth:e} deep: {local:?}");
         assert_eq!(piece.nearest, None);
         return false;
     };
-    assert!(depth < slack, "hit, though {depth:e} outside: {local:?} {piece:?}");
+    assert!(depth < tol, "hit, though {depth:e} outside: {local:?} {piece:?}");
     assert!(t_in <= t_out, "{local:?} {piece:?}");
     for (t, face) in [(t_in, face_in), (t_out, face_out)] {
-        let (on_face, slack) = (K::faces(at(t), param)[face as usize], K::slack(at(t), param, tol));
-        assert!(on_face.abs() < slack && K::depth(at(t), param) < slack, "{on_face:e} off at {t}: {local:?} {piece:?}");
+        let on_face = K::faces(at(t), param)[face as usize];
+        assert!(on_face.abs() < tol && K::depth(at(t), param) < tol, "{on_face:e} off at {t}: {local:?} {piece:?}");
     }
     // The depth is convex and zero at both ends: a deep line has its bottom between them, so they are the two roots.
-    let deep = depth < -4.0 * slack;
+    let deep = depth < -4.0 * tol;
     if deep {
         assert!(t_in < bottom && bottom < t_out, "{local:?} {piece:?} bottom {bottom}");
         // Parity: inside in the middle, outside a little beyond either end.
-        let step = 0.02 * (t_out - t_in) + 2.0 * slack / local.1.length();
+        let step = 0.02 * (t_out - t_in) + 2.0 * tol / local.1.length();
         assert!(K::depth(at(0.5 * (t_in + t_out)), param) < 0.0);
         assert!(K::depth(at(t_in - step), param) > 0.0 && K::depth(at(t_out + step), param) > 0.0, "{local:?}");
     }

@@ -5,6 +5,7 @@
 
 use glam::DVec3;
 
+use super::super::margin::point_to_triangle;
 use super::super::shapes;
 use super::super::spans::{self, Crossing, Span};
 use super::tori;
@@ -56,6 +57,34 @@ pub(super) fn normal(solid: &Solid, face: u32, p: DVec3) -> DVec3 {
             shapes::cross(b - a, c - a)
         }
     }
+}
+
+/// Distance of a point of the surface from a flat face, canonical space; `None` for other faces.
+pub(super) fn to_face(solid: &Solid, face: u32, p: DVec3) -> Option<f64> {
+    let slab = |axis: usize, at: f64| Some((p[axis] - at).abs());
+    match (solid, face) {
+        (Solid::Shape(Shape::Cuboid), 0..6) => slab(face as usize / 2, f64::from(face % 2) * 2.0 - 1.0),
+        (Solid::Shape(Shape::Cone { .. } | Shape::Cylinder), 1 | 2)
+        | (Solid::Taper { .. } | Solid::Round { .. } | Solid::Trough { .. }, 1 | 2) => slab(2, f64::from(face - 1)),
+        (Solid::Trough { .. }, 3 | 4) => slab(0, f64::from(face) * 2.0 - 7.0),
+        (Solid::Polyhedron(polyhedron), _) => {
+            let plane = polyhedron.planes().get(face as usize)?;
+            Some((plane.normal.dot(p) - plane.offset).abs())
+        }
+        (Solid::Mesh(mesh), _) if (face as usize) < mesh.triangles.len() => {
+            Some(point_to_triangle(p, mesh.corners(face as usize)))
+        }
+        _ => None,
+    }
+}
+
+/// How far the triangles that a line crosses reach beyond their edges.
+pub(super) fn blur(mesh: &Mesh, org: DVec3, dir: DVec3) -> f64 {
+    let crossed = (0..mesh.triangles.len()).map(|i| mesh.corners(i)).filter(|c| shapes::is_proper(*c));
+    crossed
+        .filter(|corners| shapes::triangle(*corners, org, dir).is_some())
+        .map(|corners| shapes::blur(corners, org, dir))
+        .fold(0.0, f64::max)
 }
 
 /// The inside of a closed mesh, by the number of surfaces around a point: every crossing adds or takes one, and a crossing of

@@ -215,6 +215,23 @@ impl Tree {
         if boundary.turned { -ng } else { ng }
     }
 
+    /// Whether the point of the ray at `t` (object space), on a leaf's surface, is within `reach` of its face `face`, which
+    /// is flat: one may be as small as a point or seen in so narrow a wedge that no displaced ray meets it.
+    pub fn in_face(&self, leaf: u32, face: f64, ray: &OracleRay, t: f64, reach: f64) -> bool {
+        let Leaf { solid, to_local, .. } = &self.leaves[leaf as usize];
+        let Some(face) = Some(face as u32).filter(|&number| f64::from(number) == face) else { return false };
+        let distance = leaf::to_face(solid, face, to_local.transform_point3(ray.at(t)));
+        distance.is_some_and(|d| d <= reach * magnitude::norm(to_local))
+    }
+
+    /// What a leaf's mesh is fatter by where the line of `ray` (object space) crosses it; 0 for all other leaves.
+    pub fn blur(&self, leaf: u32, ray: &OracleRay) -> f64 {
+        let Leaf { solid, to_object, to_local, .. } = &self.leaves[leaf as usize];
+        let Solid::Mesh(mesh) = solid else { return 0.0 };
+        let local = ray.transformed(to_local);
+        leaf::blur(mesh, local.org, local.dir) * magnitude::norm(to_object)
+    }
+
     /// Number of leaves, each a primitive number.
     pub fn leaf_count(&self) -> u32 {
         self.leaves.len() as u32

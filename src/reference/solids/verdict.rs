@@ -15,7 +15,7 @@ const GROUPING: f64 = 4.5;
 /// Directions of displacement, by delta and by half of it.
 const DIRECTIONS: u32 = 16;
 /// Variants in which every leaf sees a displaced ray of its own.
-const SCATTERED: u32 = 48;
+const SCATTERED: u32 = 512;
 /// Sine of the angle between ray and surface above which t is as certain as the surface.
 const GRAZING: f64 = 1e-3;
 
@@ -88,6 +88,14 @@ impl<'a> Trees<'a> {
         self.margin.delta(world.max_element())
     }
 
+    /// How far the oracle itself may be off beside the edges of meshes, world distance: a ray has to be displaced by that
+    /// much more to be seen beside them.
+    fn blur(&self, t: &PlacedTree) -> f64 {
+        let local = self.ray.transformed(&t.placed.to_object);
+        t.tree.met(&local, 0.0).map(|leaf| t.tree.blur(leaf, &local)).fold(0.0, f64::max)
+            * magnitude::norm(&t.placed.to_world)
+    }
+
     /// The ray and its displaced copies in the tree's space.
     fn displaced(&self, t: &PlacedTree, delta: f64) -> Vec<OracleRay> {
         let (a, b) = self.ray.dir.normalize().any_orthonormal_pair();
@@ -149,8 +157,9 @@ impl<'a> Trees<'a> {
         if !(self.ray.t_min <= answer.t && answer.t <= self.ray.t_max) {
             return Err("reported t is outside the segment".into());
         }
-        let delta = self.delta(t, answer.t);
+        let delta = self.delta(t, answer.t) + self.blur(t);
         let (along, window) = (self.along(delta), self.window(t, delta));
+        let (local, reach) = (self.ray.transformed(&t.placed.to_object), delta * magnitude::norm(&t.placed.to_object));
         let crossings: Vec<_> =
             self.displaced(t, delta).iter().map(|ray| ends(&t.tree.intervals(t.leaf, ray))).collect();
         let most = crossings.iter().map(Vec::len).max().unwrap_or(0);
@@ -161,16 +170,16 @@ impl<'a> Trees<'a> {
                 if let Some(end) = list.get(k) {
                     (lo, hi) = (lo.min(end.t), hi.max(end.t));
                     faces.push(f64::from(end.face));
-                    // Where a neighbour has no such pair the two ends meet on the way to it.
+                    // Where a neighbour has no such pair the two ends meet on the way to it, anywhere between them.
                     let other = list[k ^ 1].t;
                     if (other - end.t).abs() < shortest && crossings.iter().any(|l| l.len() <= k) {
                         shortest = (other - end.t).abs();
-                        let middle = 0.5 * other + 0.5 * end.t;
-                        (lo, hi) = (lo.min(middle), hi.max(middle));
+                        (lo, hi) = (lo.min(other), hi.max(other));
                     }
                 }
             }
-            let fits = lo - along <= answer.t && answer.t <= hi + along && faces.contains(&answer.u);
+            let face = faces.contains(&answer.u) || t.tree.in_face(t.leaf, answer.u, &local, answer.t, 2.0 * reach);
+            let fits = lo - along <= answer.t && answer.t <= hi + along && face;
             if !fits {
                 continue;
             }
@@ -192,7 +201,7 @@ impl<'a> Trees<'a> {
             let local = self.ray.transformed(&t.placed.to_object);
             let own = Variant { boundaries: t.tree.boundaries(&local, 0.0), displaced: false, grouped: false };
             let first = own.boundaries.iter().find(|b| self.ray.t_min <= b.t).map_or(until, |b| b.t.min(until));
-            let delta = self.delta(&t, first);
+            let delta = self.delta(&t, first) + self.blur(&t);
             let slack = self.along(delta) + self.window(&t, delta);
             let clear = |variant: &Variant, slack: f64| {
                 let (from, to) = (self.ray.t_min + slack, self.ray.t_max.min(until) - slack);
@@ -226,7 +235,7 @@ impl<'a> Trees<'a> {
     /// Whether some tree has a variant with a boundary in the segment, and why.
     pub fn grazed(&self) -> Option<Why> {
         self.near().find_map(|t| {
-            let delta = self.delta(&t, self.ray.t_max);
+            let delta = self.delta(&t, self.ray.t_max) + self.blur(&t);
             let slack = self.along(delta) + self.window(&t, delta);
             let (from, to) = (self.ray.t_min - slack, self.ray.t_max + slack);
             let touches = |v: &Variant| v.boundaries.iter().any(|b| from <= b.t && b.t <= to);

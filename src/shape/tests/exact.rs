@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::super::{Cone, Cuboid, Cylinder, Disc, HalfSpace, Placed, Solid, Sphere};
-use super::{Piece, Ray, Widths, canonical};
+use super::super::{Cone, Cuboid, Cylinder, Disc, HalfSpace, Placed, Solid, Span, Sphere, quadric};
+use super::{Piece, Random, Ray, Widths, canonical};
 use crate::ray::Packet;
 
 fn line(o: [f64; 3], d: [f64; 3]) -> Ray {
@@ -125,6 +125,66 @@ fn cone() {
     misses::<Cone>(0.5, line([1.2, 0.0, 1.5], [0.0, 0.1, 1.0]));
     grazes::<Cone>(0.0, line([-2.0, 0.0, 1.0], [1.0, 0.0, 0.0]));
     grazes::<Cone>(0.0, line([-2.0, 0.5, 0.5], [1.0, 0.0, 0.0]));
+}
+
+/// Lines through `tip`, all numbers exact in f32; the parameter there is 1. None is nearly along the cone of slope 1, where
+/// the far root is uncertain.
+fn lines_through(tip: DVec3) -> impl Iterator<Item = Ray> {
+    let mut r = Random(7);
+    let mut number = move || (r.unit() * 128.0).floor() / 16.0 - 4.0;
+    let origins = std::iter::repeat_with(move || DVec3::new(number(), number(), number()));
+    let lines = origins.map(move |o| (o, tip - o));
+    lines.filter(|(_, d)| (d.x.hypot(d.y) - d.z.abs()).abs() > 0.1 * d.length()).take(4000)
+}
+
+#[test]
+fn lines_through_the_tip_of_a_cone_meet_it_there() {
+    let mut steep = 0;
+    for ray in lines_through(DVec3::Z) {
+        for (piece, epsilon) in pieces::<Cone>(ray, 0.0) {
+            let (d, tolerance) = (ray.1, 16.0 * epsilon * (1.0 + ray.0.length()) / ray.1.length());
+            let (across, along) = (d.x.hypot(d.y), d.z.abs());
+            let at_tip = |t: f64| (t - 1.0).abs() <= tolerance;
+            match piece.span {
+                Some([entry, exit]) if along > across => {
+                    steep += 1;
+                    let (tip, base) = if d.z < 0.0 { (entry, exit) } else { (exit, entry) };
+                    assert!(at_tip(tip.0) && base.1 == 1 && !at_tip(base.0), "{ray:?}: {piece:?}");
+                }
+                None => assert!(along <= across, "{ray:?} missed"),
+                Some([entry, exit]) => assert!(at_tip(entry.0) && at_tip(exit.0), "{ray:?}: {piece:?}"),
+            }
+        }
+    }
+    assert!(steep > 2000, "{steep}");
+}
+
+#[test]
+fn lines_across_a_sharp_end_meet_it_there() {
+    // x^2 + y^2 <= 1 - z and y^2 <= 1 - z have a tip and an edge at z = 1, where lines in that plane meet them.
+    for (o, d) in lines_through(DVec3::Z).map(|(o, d)| (o.with_z(1.0), d.with_z(0.0))).filter(|(_, d)| d.y != 0.0) {
+        let tolerance = 16.0 * f64::EPSILON * (1.0 + o.length()) / d.length();
+        let mut check = |span: Span<f64>| {
+            let at_end = |t: f64| (t - 1.0).abs() <= tolerance;
+            assert!(!span.hit || (at_end(span.t_in) && at_end(span.t_out)), "{o} {d}: {span:?}");
+        };
+        quadric::trough::<f64>(o.to_array(), d.to_array(), [1.0, -1.0, 0.0], &mut check);
+        quadric::round::<f64>(o.to_array(), d.to_array(), [1.0, -1.0, 0.0], &mut check);
+        // A little below: a strip of half the width 1/32, a disc of that radius.
+        let below = o.with_z(1.0 - 1.0 / 1024.0).to_array();
+        let crossed = |half: f64, span: Span<f64>| {
+            assert!(span.hit && (span.t_in - (1.0 - half)).abs() <= tolerance, "{o} {d}: {span:?}");
+            assert!((span.t_out - (1.0 + half)).abs() <= tolerance, "{o} {d}: {span:?}");
+        };
+        let strip = 1.0 / 32.0 / d.y.abs();
+        let within = (d.x * strip).abs() < 0.75;
+        quadric::trough::<f64>(below, d.to_array(), [1.0, -1.0, 0.0], |span| {
+            if within {
+                crossed(strip, span);
+            }
+        });
+        quadric::round::<f64>(below, d.to_array(), [1.0, -1.0, 0.0], |span| crossed(1.0 / 32.0 / d.length(), span));
+    }
 }
 
 #[test]
