@@ -5,6 +5,7 @@
 
 mod binary;
 mod build;
+mod bundle;
 mod collapse;
 mod node;
 mod quality;
@@ -13,5 +14,6 @@ mod quality;
 mod tests;
 
 pub use build::{BuildSettings, Leaf, Preset, Tree, build};
+pub use bundle::Bundle;
 pub use node::{Child, LEAF_PRIMS, Node, WIDTH};
 pub use quality::Quality;

@@ -5,7 +5,7 @@
 use super::leaf::{Leaf, LeafInput, Stores};
 use super::solid::{LINEAR, Solid};
 use super::tree::{Gate, Node, Token, Tree};
-use crate::bvh::{self, Preset};
+use crate::bvh::{self, BuildSettings, Preset};
 use crate::lanes::Real;
 use crate::math::Aabb;
 
@@ -260,9 +260,10 @@ impl<S: Real> Solid<S> {
         }
         let (held, always): (Vec<u32>, Vec<u32>) = all.partition(bounded);
         let boxes: Vec<_> = held.iter().map(|&i| self.leaves[i as usize].clip).collect();
-        let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], preset);
-        let blocks = leaves.iter().map(|leaf| leaf.prims.iter().map(|&p| held[p as usize]).collect()).collect();
-        self.search = Some((tree, blocks));
+        // One leaf of the solid in each leaf of the tree, whose box is then all that is asked of it.
+        let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], BuildSettings { preset, leaf: 1 });
+        let numbers = leaves.iter().flat_map(|leaf| leaf.prims.iter().map(|&p| held[p as usize])).collect();
+        self.search = Some((tree, numbers));
         self.always = always;
     }
 }

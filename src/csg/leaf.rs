@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
+use super::events::Events;
 use super::mesh::{Crossings, Mesh};
-use super::sweep::Events;
 use crate::lanes::{Lanes, Real};
 use crate::math::{Aabb, Affine, transformed_bounds};
 use crate::ray::Packet;

@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::sweep::Events;
+use super::events::Events;
 use crate::bvh::{self, Preset};
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::Packet;

@@ -199,8 +199,17 @@ impl Program {
         for (value, gate) in self.values.iter_mut().zip(&self.gates) {
             *value = gate.start;
         }
+        // Neighbours are often operands of one operation: its value stays at hand.
+        let (mut parent, mut value) = (0, self.values.first().copied().unwrap_or(0));
         for (leaf, &inside) in self.leaves.iter().zip(inside) {
-            fold(&mut self.values[leaf.parent as usize], leaf.gate, inside ^ leaf.negated);
+            if leaf.parent != parent {
+                self.values[parent as usize] = value;
+                (parent, value) = (leaf.parent, self.values[leaf.parent as usize]);
+            }
+            fold(&mut value, leaf.gate, inside ^ leaf.negated);
+        }
+        if let Some(last) = self.values.get_mut(parent as usize) {
+            *last = value;
         }
         for i in (1..self.gates.len()).rev() {
             let GateStep { parent, .. } = self.gates[i];

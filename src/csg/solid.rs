@@ -1,11 +1,11 @@
 //! A compiled solid: leaves, operations, bounds, and a tree over the leaves' boxes where there are many.
 
+use super::events::Events;
 use super::leaf::{Leaf, Stores};
 use super::mesh::Crossings;
 use super::prune::Met;
-use super::sweep::Events;
 use super::tree::Tree;
-use crate::bvh;
+use crate::bvh::{self, Bundle};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::math::Aabb;
 use crate::ray::Packet;
@@ -32,8 +32,8 @@ pub struct Solid<S> {
     pub(super) size: S,
     /// Least distance of two boundaries, in the tree's space.
     pub(super) least: S,
-    /// Tree over the boxes of bounded leaves, and its blocks; empty for small solids.
-    pub(super) search: Option<(bvh::Tree<S>, Vec<Vec<u32>>)>,
+    /// Tree over the boxes of bounded leaves, and which leaf is in each of its own; `None` for small solids.
+    pub(super) search: Option<(bvh::Tree<S>, Vec<u32>)>,
     /// Leaves that the tree does not hold.
     pub(super) always: Vec<u32>,
     /// Whether it is its only leaf, box and all.
@@ -59,11 +59,10 @@ impl<S: Real> Solid<S> {
 
     /// Bytes of leaves, operations and trees.
     pub fn bytes(&self) -> usize {
-        let (tree, blocks) = self.search.as_ref().map_or((0, 0), |(tree, blocks)| {
-            (size_of_val(&tree.nodes[..]), blocks.iter().map(|b| size_of_val(&b[..])).sum())
-        });
+        let search = self.search.as_ref();
+        let search = search.map_or(0, |(tree, numbers)| size_of_val(&tree.nodes[..]) + size_of_val(&numbers[..]));
         let own = size_of_val(&self.leaves[..]) + size_of_val(&self.stores.planes[..]) + size_of_val(&self.numbers[..]);
-        own + self.stores.meshes.iter().map(|m| m.bytes()).sum::<usize>() + self.tree.bytes() + tree + blocks
+        own + self.stores.meshes.iter().map(|m| m.bytes()).sum::<usize>() + self.tree.bytes() + search
     }
 
     /// Difference of t below which two boundaries of a lane are one. It depends on the lane's line only.
@@ -99,36 +98,46 @@ impl<S: Real> Solid<S> {
     ) {
         met.clear();
         let (start, end) = (packet.t_min - (eps + eps), reach + (eps + eps));
-        let meets = |bounds: &Aabb<S>| {
-            let interval = Interval::of(packet, bounds.lo, bounds.hi);
-            let (near, far) = (interval.near, interval.far);
+        let meets = |interval: &Interval<V>| {
+            let Interval { near, far } = *interval;
             (near.cmp_le(far) & start.cmp_le(far) & near.cmp_le(end)).bits()
         };
-        let mut take = |leaf: u32, lanes: u32| {
-            let lanes = meets(&self.leaves[leaf as usize].clip) & lanes;
+        for &leaf in &self.always {
+            let clip = &self.leaves[leaf as usize].clip;
+            let lanes = meets(&Interval::of(packet, clip.lo, clip.hi)) & lanes;
             if lanes != 0 {
                 met.push(Met { leaf, lanes });
             }
-        };
-        for &leaf in &self.always {
-            take(leaf, lanes);
         }
-        let Some((tree, blocks)) = &self.search else { return };
+        let Some((tree, numbers)) = &self.search else { return };
         if tree.nodes.is_empty() {
             return;
         }
+        // All lanes against eight boxes at once first.
+        let bundle = Bundle::of(packet, lanes, end).starting(start);
+        let mut near = [S::ZERO; bvh::WIDTH];
         stack.clear();
         stack.push((0, lanes));
         while let Some((node, lanes)) = stack.pop() {
             let node = &tree.nodes[node as usize];
-            for slot in 0..node.used as usize {
-                let lanes = meets(&node.child_bounds(slot)) & lanes;
+            let uniform = bundle.is_uniform();
+            let mut slots = if uniform { bundle.children::<V>(node, &mut near) } else { u32::MAX };
+            slots &= (1 << node.used) - 1;
+            while slots != 0 {
+                let slot = slots.trailing_zeros() as usize;
+                slots &= slots - 1;
+                let lanes = if uniform {
+                    meets(&bundle.interval(packet, node, slot))
+                } else {
+                    let bounds = node.child_bounds(slot);
+                    meets(&Interval::of(packet, bounds.lo, bounds.hi))
+                } & lanes;
                 if lanes == 0 {
                     continue;
                 }
                 let child = node.child(slot);
                 if child.is_leaf() {
-                    blocks[child.index as usize].iter().for_each(|&leaf| take(leaf, lanes));
+                    met.push(Met { leaf: numbers[child.index as usize], lanes });
                 } else {
                     stack.push((child.index, lanes));
                 }

@@ -6,13 +6,13 @@
 //! alone. Sources: Roth, "Ray casting for modeling solids", 1982 (boundaries per line); Lefebvre, "IceSL: A GPU
 //! accelerated CSG modeler and slicer", 2013 (sweep over sorted boundaries with early end).
 
+use super::events::Events;
 use super::mesh::Crossings;
 use super::prune::{Met, Program, Pruner};
 use super::solid::Solid;
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
-use crate::shape::Span;
 
 /// What a packet needs while it sweeps; grows on use, for any solid.
 #[derive(Debug, Default)]
@@ -25,16 +25,6 @@ pub struct Scratch<S> {
     toggled: Vec<Toggled>,
     stack: Vec<(u32, u32)>,
     crossings: Crossings,
-}
-
-/// Boundaries of leaves: `MAX_LANES` numbers each.
-#[derive(Debug, Default)]
-pub struct Events<S> {
-    t: Vec<S>,
-    face: Vec<S>,
-    /// Place in the program of the leaf each belongs to.
-    leaf: Vec<u32>,
-    count: usize,
 }
 
 /// An event that was taken.
@@ -72,50 +62,6 @@ pub struct Effort {
     pub events: usize,
     /// Steps of the sweep.
     pub steps: usize,
-}
-
-impl<S: Real> Events<S> {
-    fn clear(&mut self) {
-        self.leaf.clear();
-        self.count = 0;
-    }
-
-    /// Adds one boundary of `leaf` in `lanes`.
-    #[inline(always)]
-    pub fn push<V: Lanes<Scalar = S>>(&mut self, leaf: u32, lanes: V::Mask, t: V, face: V) {
-        let at = self.count * MAX_LANES;
-        self.count += 1;
-        if self.t.len() < at + MAX_LANES {
-            self.t.resize(at + MAX_LANES, S::ZERO);
-            self.face.resize(at + MAX_LANES, S::ZERO);
-        }
-        V::select(lanes, t, V::splat(S::INFINITY)).store(&mut self.t[at..]);
-        face.store(&mut self.face[at..]);
-        self.leaf.push(leaf);
-    }
-
-    /// Adds both boundaries of a span in the lanes of `lanes`. Those that lie outside of the leaf's box, by more than rounding,
-    /// go to infinity: there the leaf makes no difference, and a boundary must not count where it is not.
-    #[inline(always)]
-    pub fn push_span<V: Lanes<Scalar = S>>(&mut self, leaf: u32, lanes: u32, span: &Span<V>, within: &Interval<V>) {
-        let (before, after) = (-V::splat(S::INFINITY), V::splat(S::INFINITY));
-        let settled = |t: V| {
-            let t = V::select(t.cmp_lt(within.near), before, t);
-            V::select(within.far.cmp_lt(t), after, t)
-        };
-        let (t_in, t_out) = (settled(span.t_in), settled(span.t_out));
-        // Both or none; NaN is none.
-        let both = span.hit & t_in.cmp_le(t_out) & V::Mask::from_bits(lanes);
-        if both.any() {
-            self.push(leaf, both, t_in, span.face_in);
-            self.push(leaf, both, t_out, span.face_out);
-        }
-    }
-
-    #[inline(always)]
-    fn time<V: Lanes<Scalar = S>>(&self, event: usize) -> V {
-        V::load(&self.t[event * MAX_LANES..])
-    }
 }
 
 /// How much of the lines' way through a solid is looked at.
@@ -259,11 +205,12 @@ fn walk<V: Lanes>(
     inside.clear();
     inside.resize(met.len(), 0);
     let mut state = program.run(inside);
+    let never = V::splat(V::Scalar::INFINITY);
+    let mut next = never;
+    for event in 0..events.count {
+        next = events.time::<V>(event).fast_min(next);
+    }
     loop {
-        let mut next = V::splat(V::Scalar::INFINITY);
-        for event in 0..events.count {
-            next = events.time::<V>(event).fast_min(next);
-        }
         pending &= next.cmp_le(limit).bits();
         if pending == 0 {
             return steps;
@@ -272,8 +219,12 @@ fn walk<V: Lanes>(
         let until = next + eps;
         let (mut once, mut twice) = (0, 0);
         toggled.clear();
+        next = never;
         for event in 0..events.count {
-            let lanes = events.time::<V>(event).cmp_le(until).bits() & pending;
+            let t = events.time::<V>(event);
+            let now = t.cmp_le(until);
+            next = V::select(now, never, t).fast_min(next);
+            let lanes = now.bits() & pending;
             if lanes != 0 {
                 inside[events.leaf[event] as usize] ^= lanes;
                 toggled.push(Toggled { event: event as u32, lanes });
@@ -300,7 +251,7 @@ fn walk<V: Lanes>(
             let at = *event as usize * MAX_LANES;
             let taken = V::Mask::from_bits(*lanes);
             let t = V::load(&events.t[at..]);
-            V::select(taken, V::splat(V::Scalar::INFINITY), t).store(&mut events.t[at..]);
+            V::select(taken, never, t).store(&mut events.t[at..]);
         }
     }
 }

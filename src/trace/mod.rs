@@ -6,7 +6,6 @@
 
 mod all;
 mod brute;
-mod bundle;
 mod leaf;
 mod output;
 mod query;

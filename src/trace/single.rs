@@ -1,8 +1,8 @@
 //! One ray through the 8-wide tree: a stack of single numbers instead of packets of them.
 
-use super::bundle::Bundle;
 use super::query::Query;
 use super::traverse::Leaves;
+use crate::bvh::Bundle;
 use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::Real;
 use crate::ray::Packet;

@@ -5,10 +5,10 @@
 //! single rays after Benthin, Wald, Woop, Ernst, Mark, "Combining Single and Packet-Ray Tracing for Arbitrary Ray
 //! Distributions on the Intel MIC Architecture", 2012.
 
-use super::bundle::Bundle;
 use super::leaf;
 use super::query::Query;
 use super::single;
+use crate::bvh::Bundle;
 use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Packet;

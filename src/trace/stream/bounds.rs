@@ -1,6 +1,6 @@
 //! Bounds over all rays of a chunk: which of eight boxes none of them meets.
 //!
-//! As for packets ([`crate::trace::bundle`]): the same monotone expression as the box test of one ray, at the ends of
+//! As for packets ([`crate::bvh::Bundle`]): the same monotone expression as the box test of one ray, at the ends of
 //! the intervals, so that a box that a ray meets is never rejected. Short rays that start near each other, such as
 //! those of ambient occlusion, get rid of most of the upper nodes' children by it.
 

@@ -72,6 +72,31 @@ impl<S: Real> Default for Memory<S> {
     }
 }
 
+/// What rays are sorted by, a bit per lane: whether they go down along x, y, z, whether y and z are their dominant axes.
+struct Signs([u32; 5]);
+
+impl Signs {
+    #[inline(always)]
+    fn of<V: Lanes>(packet: &Packet<V>) -> Self {
+        // The sign of the reciprocal, without a division.
+        let [x, y, z] = packet.dir.map(|d| d.cmp_le(V::splat(-V::Scalar::MIN_POSITIVE)).bits());
+        Self([x, y, z, packet.dominant[1], packet.dominant[2]])
+    }
+
+    /// Whether all lanes of `live` have the same bits.
+    #[inline(always)]
+    fn agree(&self, live: u32) -> bool {
+        self.0.into_iter().all(|bits| bits & live == 0 || bits & live == live)
+    }
+
+    /// Whether they have the same direction along two axes or all.
+    #[inline(always)]
+    fn nearly_agree(&self, live: u32) -> bool {
+        let [x, y, z] = [0, 1, 2].map(|axis| u32::from(self.0[axis] & live == 0 || self.0[axis] & live == live));
+        x + y + z >= 2
+    }
+}
+
 /// The engine; `V`: the vectors of rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream<V>(pub PhantomData<fn() -> V>);
@@ -99,12 +124,13 @@ impl<S: Real> Job<'_, S> {
         starts: impl Iterator<Item = usize>,
     ) {
         self.memory.waiting.reserve(self.world.stack_bound());
-        // Packets test a shape in all lanes at once, chunks ray by ray. Rays that only ask whether there is anything are
-        // done too soon for chunks to make up for that.
-        let packets = ANY && self.world.is_of_shapes();
+        let of_shapes = self.world.is_of_shapes();
         let mut sorted = 0;
         for at in starts {
-            sorted += self.sort::<V, ANY, COUNT>(at, packets);
+            sorted += match of_shapes {
+                true => self.among_shapes::<V, ANY, COUNT>(at),
+                false => self.among_triangles::<V, ANY, COUNT>(at),
+            };
             if sorted + V::N > SOURCE {
                 self.sorted::<V, ANY, COUNT>();
                 sorted = 0;
@@ -113,31 +139,52 @@ impl<S: Real> Job<'_, S> {
         self.sorted::<V, ANY, COUNT>();
     }
 
-    /// Traces a vector of coherent rays (of any with `packets`) as a packet, or sorts its live rays by octant and dominant axis. Returns how
-    /// many were sorted.
+    /// Traces a vector of rays of one or two octants (any-hit: of any) as a packet, or sorts its live rays. Returns how many were
+    /// sorted. Packets test a shape in all lanes at once, chunks ray by ray; rays that only ask whether there is anything
+    /// are done too soon for chunks to make up for that.
     #[inline(always)]
-    fn sort<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize, packets: bool) -> usize {
+    fn among_shapes<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
+        let (packet, t_max, live) = self.load::<V, COUNT>(at);
+        let alike = live != 0 && (ANY || Signs::of(&packet).nearly_agree(live));
+        if alike {
+            self.trace::<V, ANY, COUNT>(at, &packet, t_max, live);
+            return 0;
+        }
+        self.sort(at, &packet, t_max, live)
+    }
+
+    /// Traces a vector of rays that point nearly the same way as a packet, or sorts its live rays. Returns how many were
+    /// sorted.
+    #[inline(always)]
+    fn among_triangles<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
         let rays = self.rays;
         let columns = rays.org.iter().chain(&rays.dir).chain([&rays.t_min, &rays.t_max]);
         columns.for_each(|column| prefetch(column, at + AHEAD * V::N));
-        let (packet, t_max, live) = Packet::<V>::load(rays, at);
-        if COUNT {
-            self.counters.rays += u64::from(live.count_ones());
-        }
-        // The sign of the reciprocal, without a division.
-        let backward = packet.dir.map(|d| d.cmp_le(V::splat(-S::MIN_POSITIVE)).bits());
-        let uniform = |bits: u32| bits & live == 0 || bits & live == live;
-        let [_, y, z] = packet.dominant;
-        let alike = packets || backward.into_iter().chain([y, z]).all(uniform);
-        if live != 0 && alike && self.packet::<V, ANY, COUNT>(at, live, packets) {
+        let (packet, t_max, live) = self.load::<V, COUNT>(at);
+        if live != 0 && Signs::of(&packet).agree(live) && self.packet::<V, ANY, COUNT>(at, &packet, t_max, live) {
             return 0;
         }
+        self.sort(at, &packet, t_max, live)
+    }
+
+    #[inline(always)]
+    fn load<V: Lanes<Scalar = S>, const COUNT: bool>(&mut self, at: usize) -> (Packet<V>, V, u32) {
+        let loaded = Packet::<V>::load(self.rays, at);
+        if COUNT {
+            self.counters.rays += u64::from(loaded.2.count_ones());
+        }
+        loaded
+    }
+
+    /// Sorts the `live` rays of the vector at `at` by octant and dominant axis. Returns how many.
+    #[inline(always)]
+    fn sort<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>, t_max: V, live: u32) -> usize {
         match &mut self.output {
             Output::Closest(hits) if live != V::ALL => HitPacket::<V>::new(t_max).store(hits, at),
             Output::Closest(_) => {}
             Output::Any(out) => out.iter_mut().skip(at).take(V::N).for_each(|out| *out = 0),
         }
-        let keys = transpose_bits([backward[0], backward[1], backward[2], y, z]);
+        let keys = transpose_bits(Signs::of(packet).0);
         let mut rest = live;
         while rest != 0 {
             let lane = rest.trailing_zeros();
@@ -149,28 +196,40 @@ impl<S: Real> Job<'_, S> {
     }
 
     /// Traces the `live` rays of one octant and dominant axis that start at `at` as a packet, if they point nearly the
-    /// same way; otherwise returns false. With `packets`, traces any rays.
+    /// same way; otherwise returns false.
     #[inline(never)]
     fn packet<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
         &mut self,
         at: usize,
+        packet: &Packet<V>,
+        t_max: V,
         live: u32,
-        packets: bool,
     ) -> bool {
-        let (packet, t_max, _) = Packet::<V>::load(self.rays, at);
         let spread = |slope: V| {
             let (low, high) = slope.range(live);
             high - low
         };
         let most = V::Scalar::from_f64(SPREAD);
-        if !(packets || spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most) {
-            return false;
+        let alike = spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most;
+        if alike {
+            self.trace::<V, ANY, COUNT>(at, packet, t_max, live);
         }
+        alike
+    }
+
+    /// Traces the `live` rays of the vector at `at` as a packet.
+    #[inline(always)]
+    fn trace<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        at: usize,
+        packet: &Packet<V>,
+        t_max: V,
+        live: u32,
+    ) {
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
-        traverse::world(self.world, &packet, &mut query, live);
+        traverse::world(self.world, packet, &mut query, live);
         let (hit, done) = (query.hit, query.done);
         self.output.put(at, &hit, done);
-        true
     }
 
     /// Traces what was sorted, chunk by chunk.

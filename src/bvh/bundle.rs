@@ -5,7 +5,7 @@
 //! [`crate::ray::slab`], taken at the ends of the intervals, so a box that any lane meets is never rejected. For a
 //! packet of one ray the intervals are points and this is that ray's own test.
 
-use crate::bvh::{Node, WIDTH};
+use super::node::{Node, WIDTH};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Packet;
 use crate::ray::slab::{Interval, pad};
@@ -44,6 +44,13 @@ impl<S: Real> Bundle<S> {
             reach: t_max.range(lanes).1,
             lanes,
         }
+    }
+
+    /// The same for segments that start at `t_min`.
+    #[inline(always)]
+    pub fn starting<V: Lanes<Scalar = S>>(mut self, t_min: V) -> Self {
+        self.t_min = t_min.range(self.lanes).0;
+        self
     }
 
     /// Whether all lanes look into one octant: only then can the bundle be tested as a whole.
