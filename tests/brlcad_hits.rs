@@ -91,7 +91,7 @@ fn is_explained(worlds: &Worlds, pixel: &Pixel) -> bool {
         return true;
     }
     let (Some(found), Some(expected)) = (pixel.found, pixel.expected) else { return false };
-    let close = |b: &(usize, f64, DVec3)| (b.1 - found.1).abs() <= 2.0 * TOLERANCE;
+    let close = |b: &(usize, f64, DVec3)| (b.1 - found.1).abs() <= TOLERANCE;
     let entered = boundaries(&worlds.together, pixel).into_iter().filter(close).any(|b| b.0 == expected.0);
     let shown = boundaries(&worlds.surfaces, pixel).into_iter().filter(close).any(|(_, t, normal)| {
         let turned = if normal.dot(expected.2) < 0.0 { -normal } else { normal };

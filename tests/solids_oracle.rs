@@ -58,6 +58,12 @@ fn judged<S: Engines>(description: &Description, n: usize, seed: u64, precision:
 }
 
 fn all<S: Engines>(precision: Precision, kinds: usize, seeds: std::ops::Range<u64>, n: usize) {
+    let sum = trees::<S>(precision, kinds, seeds, n);
+    assert!(sum.hits > sum.rays / 8, "only {} of {} rays hit", sum.hits, sum.rays);
+}
+
+/// The sum over random trees, all of whose rays must be explained.
+fn trees<S: Engines>(precision: Precision, kinds: usize, seeds: std::ops::Range<u64>, n: usize) -> Tally {
     let tallies: Vec<(u64, Tally)> = seeds
         .into_par_iter()
         .map(|seed| {
@@ -76,8 +82,8 @@ fn all<S: Engines>(precision: Precision, kinds: usize, seeds: std::ops::Range<u6
         sum.merge(tally);
     }
     println!("{precision:?}, {kinds} kinds: {sum}");
-    assert!(sum.hits > sum.rays / 50, "only {} of {} rays hit", sum.hits, sum.rays);
     assert!(sum.is_clean(), "{} unexplained", sum.unexplained);
+    sum
 }
 
 /// Trees per test and rays per tree.
@@ -118,10 +124,10 @@ fn elliptic_tori<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, 
 #[test]
 fn tips_rims_and_faces() {
     for seed in [10_034, 10_158, 10_394, 11_031, 11_115, 11_426, 11_513, 11_662, 11_851, 11_960] {
-        all::<f64>(Precision::F64, KINDS, seed..seed + 1, 5000);
+        trees::<f64>(Precision::F64, KINDS, seed..seed + 1, 5000);
     }
-    for seed in [20_014, 20_339, 20_346, 20_382, 20_972, 21_154, 21_256, 21_603] {
-        all::<f32>(Precision::F32, KINDS, seed..seed + 1, 5000);
+    for seed in [20_014, 20_339, 20_346, 20_382, 20_893, 20_972, 21_154, 21_256, 21_603] {
+        trees::<f32>(Precision::F32, KINDS, seed..seed + 1, 5000);
     }
 }
 

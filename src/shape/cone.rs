@@ -21,12 +21,14 @@ impl Solid for Cone {
         // Inside the double cone: f(t) = a t^2 + 2 b t + c <= 0, with radius r(z) = 1 - slope z.
         let slope = V::splat(V::Scalar::ONE - top);
         let fall = slope * d[2];
-        let radius = |o: Lanes3<V>| V::constant(1.0) - slope * o[2];
-        let half_slope = |o: Lanes3<V>| o[0].mul_add(d[0], o[1] * d[1]) + fall * radius(o);
+        let at = |o: Lanes3<V>| {
+            let radius = V::constant(1.0) - slope * o[2];
+            let b = o[0].mul_add(d[0], o[1] * d[1]) + fall * radius;
+            [b, o[0].mul_add(o[0], o[1] * o[1]) - radius * radius]
+        };
         let a = d[0].mul_add(d[0], d[1] * d[1]) - fall * fall;
-        let (o, shift) = nearest_to_vertex(o, d, a, half_slope);
-        let (b, radius) = (half_slope(o), radius(o));
-        let c = o[0].mul_add(o[0], o[1] * o[1]) - radius * radius;
+        let (o, shift) = nearest_to_vertex(o, d, a, at);
+        let [b, c] = at(o);
         let disc = b.mul_add(b, -(a * c));
         let steep = a.cmp_lt(zero);
         // A line steeper than the cone always crosses it; only rounding can say otherwise.

@@ -41,11 +41,13 @@ fn pieces<V: Lanes>(
     let [g0, g1, g2] = g.map(V::splat);
     // f(t) = a t^2 + 2 b t + c <= 0.
     let a = product(d, d) - g2 * (d[2] * d[2]) + zero;
-    let half_slope = |o: Lanes3<V>| product(o, d) - V::constant(0.5) * (g1 * d[2]) - g2 * (o[2] * d[2]);
-    let (o, shift) = nearest_to_vertex(o, d, a, half_slope);
+    let at = |o: Lanes3<V>| {
+        let b = product(o, d) - V::constant(0.5) * (g1 * d[2]) - g2 * (o[2] * d[2]);
+        [b, product(o, o) - g2.mul_add(o[2], g1).mul_add(o[2], g0)]
+    };
+    let (o, shift) = nearest_to_vertex(o, d, a, at);
     let ends = ends(o);
-    let b = half_slope(o);
-    let c = product(o, o) - g2.mul_add(o[2], g1).mul_add(o[2], g0);
+    let [b, c] = at(o);
     let disc = b.mul_add(b, -(a * c));
     let root = disc.fast_max(zero).sqrt();
     let q = V::select(b.cmp_lt(zero), root - b, -(b + root));

@@ -106,18 +106,24 @@ pub fn nearest_to_origin<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>) -> (Lanes3<V>, V)
     (near, first + second)
 }
 
-/// Like [`nearest_to_origin`], but to where f(t) = a t^2 + 2 b t + c has its least or largest value, if that is not far:
-/// from there the two roots are as far apart as they are exact, also where they meet (a cone's tip, the line in which a
-/// trough ends). `b` of a point of the line.
+/// Like [`nearest_to_origin`], but to where f(t) = a t^2 + 2 b t + c has its least or largest value, if that is near and both
+/// roots are near it: from there they are as far apart as they are exact, also where they meet (a cone's tip, the line in
+/// which a trough ends). A root far from it would suffer from the digits that a loses. `at`: b and c of a point of the line.
 #[inline(always)]
-pub fn nearest_to_vertex<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, a: V, b: impl Fn(Lanes3<V>) -> V) -> (Lanes3<V>, V) {
+pub fn nearest_to_vertex<V: Lanes>(
+    o: Lanes3<V>,
+    d: Lanes3<V>,
+    a: V,
+    at: impl Fn(Lanes3<V>) -> [V; 2],
+) -> (Lanes3<V>, V) {
     let square = crate::lanes::dot(d, d);
     let first = -(crate::lanes::dot(o, d) / square);
     let rough = [d[0].mul_add(first, o[0]), d[1].mul_add(first, o[1]), d[2].mul_add(first, o[2])];
-    let slope = b(rough);
+    let [b, c] = at(rough);
     let longest = d[0].abs().fast_max(d[1].abs()).fast_max(d[2].abs());
-    let close = (slope.abs() * longest).cmp_lt(V::constant(4.0) * a.abs());
-    let second = -(V::select(close, slope, crate::lanes::dot(rough, d)) / V::select(close, a, square));
+    let together = (V::constant(16.0) * b.mul_add(b, -(a * c))).cmp_lt(b * b);
+    let close = (b.abs() * longest).cmp_lt(V::constant(4.0) * a.abs()) & together;
+    let second = -(V::select(close, b, crate::lanes::dot(rough, d)) / V::select(close, a, square));
     let near = [d[0].mul_add(second, rough[0]), d[1].mul_add(second, rough[1]), d[2].mul_add(second, rough[2])];
     (near, first + second)
 }
