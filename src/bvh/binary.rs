@@ -11,7 +11,7 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 
 use super::build::Preset;
-use crate::lanes::Real;
+use crate::lanes::{Real, each};
 use crate::math::Aabb;
 
 /// Marks a leaf in [`Binary::right`].
@@ -136,7 +136,7 @@ fn group_by_centre<S: Real>(boxes: &[Aabb<S>], prims: &[u32]) -> (Vec<obvhs::aab
         .map(|&p| {
             let (lo, hi) = boxes[p as usize].to_f64();
             let b = Aabb::<f32>::enclosing((lo - centre) * scale, (hi - centre) * scale);
-            let key = [0, 1, 2].map(|a| ((b.lo[a] + b.hi[a]) * (0.5 * CELLS)).round() as i32);
+            let key = each(|a| ((b.lo[a] + b.hi[a]) * (0.5 * CELLS)).round() as i32);
             (key, p, b)
         })
         .collect();

@@ -6,7 +6,7 @@
 //! packet of one ray the intervals are points and this is that ray's own test.
 
 use super::node::{Node, WIDTH};
-use crate::lanes::{LaneMask, Lanes, Real};
+use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::Packet;
 use crate::ray::slab::{Interval, pad};
 
@@ -31,14 +31,14 @@ impl<S: Real> Bundle<S> {
     /// Bounds over `lanes` (not empty) of `packet`, whose segments end at `t_max`.
     #[inline(always)]
     pub fn of<V: Lanes<Scalar = S>>(packet: &Packet<V>, lanes: u32, t_max: V) -> Self {
-        let rcp = packet.rcp.map(|r| r.range(lanes));
-        let org = packet.org.map(|o| o.range(lanes));
-        let backward = rcp.map(|(low, _)| low < S::ZERO);
+        let rcp = map3(packet.rcp, |r| r.range(lanes));
+        let org = map3(packet.org, |o| o.range(lanes));
+        let backward = map3(rcp, |(low, _)| low < S::ZERO);
         Self {
             uniform: rcp.iter().all(|(low, high)| (*low < S::ZERO) == (*high < S::ZERO)),
-            near_side: backward.map(usize::from),
-            org_near: [0, 1, 2].map(|a| if backward[a] { org[a].0 } else { org[a].1 }),
-            org_far: [0, 1, 2].map(|a| if backward[a] { org[a].1 } else { org[a].0 }),
+            near_side: map3(backward, usize::from),
+            org_near: each(|a| if backward[a] { org[a].0 } else { org[a].1 }),
+            org_far: each(|a| if backward[a] { org[a].1 } else { org[a].0 }),
             rcp,
             t_min: packet.t_min.range(lanes).0,
             reach: t_max.range(lanes).1,
@@ -89,7 +89,7 @@ impl<S: Real> Bundle<S> {
     /// One child's box test for every lane of a uniform packet: no minima and maxima per axis.
     #[inline(always)]
     pub fn interval<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>, node: &Node<S>, slot: usize) -> Interval<V> {
-        let [x, y, z] = [0, 1, 2].map(|a| {
+        let [x, y, z] = each(|a| {
             let (near, far) = self.planes(node, a);
             let plane = |bound: S| (V::splat(bound) - packet.org[a]) * packet.rcp[a];
             (plane(near[slot]), plane(far[slot]))

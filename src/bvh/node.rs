@@ -1,6 +1,6 @@
 //! The flat 8-wide node.
 
-use crate::lanes::Real;
+use crate::lanes::{Real, each};
 use crate::math::Aabb;
 
 /// Children per node.
@@ -83,7 +83,7 @@ impl<S: Real> Node<S> {
     /// Box of a child.
     #[inline(always)]
     pub fn child_bounds(&self, slot: usize) -> Aabb<S> {
-        Aabb { lo: [0, 1, 2].map(|a| self.bounds[a][0][slot]), hi: [0, 1, 2].map(|a| self.bounds[a][1][slot]) }
+        Aabb { lo: each(|a| self.bounds[a][0][slot]), hi: each(|a| self.bounds[a][1][slot]) }
     }
 
     /// Reference to a child.

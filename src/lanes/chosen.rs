@@ -1,7 +1,7 @@
 //! Some lanes of a vector: their numbers, and their values one after the other.
 
 use super::words::{list_bits, positions};
-use super::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each};
+use super::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, f32x16};
 
 /// The numbers of the set bits of `bits`, in order.
 #[inline(always)]
@@ -19,6 +19,13 @@ pub fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
 pub fn packets<V: Lanes>(lanes: &[u32]) -> impl Iterator<Item = (usize, u32)> {
     let numbered = lanes.iter().enumerate().filter(|(_, bits)| **bits != 0);
     numbered.map(|(k, &bits)| (k * V::N, bits))
+}
+
+/// A list with `new` where the mask is set. Numbers are moved as floats: selection copies bits.
+#[inline(always)]
+pub fn merge(mask: <f32x16 as Lanes>::Mask, new: u32, old: [u32; MAX_LANES]) -> [u32; MAX_LANES] {
+    let old = f32x16::new(bytemuck::cast(old));
+    bytemuck::cast(<f32x16 as Lanes>::select(mask, f32x16::splat(f32::from_bits(new)), old).to_array())
 }
 
 /// Three vectors in memory, to be read lane by lane with [`at`].

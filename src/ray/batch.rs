@@ -4,7 +4,7 @@
 //! The arrays are padded with dead rays to a multiple of [`PAD`], so every packet width loads whole vectors.
 
 use crate::lanes::chosen::Chosen;
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each};
 
 /// "No primitive", "no instance".
 pub const INVALID_ID: u32 = u32::MAX;
@@ -151,7 +151,7 @@ impl<S: Real> Rays<S> {
         let zero = S::Wide::constant(0.0);
         let nothing = |v: &[Vec<S>; 3]| load(&v[0]) * zero + load(&v[1]) * zero + load(&v[2]) * zero;
         let finite = (nothing(&self.org) + nothing(&self.dir)).cmp_eq(zero);
-        let [x, y, z] = [0, 1, 2].map(|axis| load(&self.dir[axis]).cmp_eq(zero));
+        let [x, y, z] = each(|axis| load(&self.dir[axis]).cmp_eq(zero));
         let live = finite & !(x & y & z) & load(&self.t_min).cmp_le(load(&self.t_max));
         live.bits() & S::Wide::ALL
     }

@@ -1,7 +1,9 @@
 //! `N` rays in registers, their hits, and the one place where hits are committed.
 
 use super::batch::{Hits, INVALID_ID, PAD, Rays};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, finite_rcp};
+use crate::lanes::chosen::merge;
+use crate::lanes::words::positions;
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, f32x16, finite_rcp, map3};
 use crate::math::Affine;
 
 /// `N` rays with what every kernel needs of them. Shape: lanes; space: the space being traversed.
@@ -34,7 +36,7 @@ impl<V: Lanes> Packet<V> {
         Self {
             org,
             dir,
-            rcp: dir.map(finite_rcp),
+            rcp: map3(dir, finite_rcp),
             t_min,
             t_floor: V::splat(V::Scalar::LOWEST),
             dominant: [x.bits(), y.bits(), z.bits()],
@@ -55,7 +57,7 @@ impl<V: Lanes> Packet<V> {
     /// Lanes whose direction is largest along x, y, z.
     #[inline(always)]
     fn dominant_axes(dir: Lanes3<V>) -> [V::Mask; 3] {
-        let size = dir.map(V::abs);
+        let size = map3(dir, V::abs);
         let x = size[0].cmp_ge(size[1]) & size[0].cmp_ge(size[2]);
         let y = !x & size[1].cmp_ge(size[2]);
         [x, y, !x & !y]
@@ -82,14 +84,14 @@ impl<V: Lanes> Packet<V> {
     /// One lane as a packet of width 1.
     #[inline(always)]
     pub fn single(&self, lane: usize) -> Packet<V::Scalar> {
-        let pick = |v: Lanes3<V>| v.map(|x| x.lane(lane));
+        let pick = |v: Lanes3<V>| map3(v, |x| x.lane(lane));
         Packet {
             org: pick(self.org),
             dir: pick(self.dir),
             rcp: pick(self.rcp),
             t_min: self.t_min.lane(lane),
             t_floor: self.t_floor.lane(lane),
-            dominant: self.dominant.map(|bits| bits >> lane & 1),
+            dominant: map3(self.dominant, |bits| bits >> lane & 1),
             shear: pick(self.shear),
         }
     }
@@ -152,12 +154,13 @@ impl<V: Lanes> HitPacket<V> {
         self.t = V::select(mask, c.t, self.t);
         self.u = V::select(mask, c.u, self.u);
         self.v = V::select(mask, c.v, self.v);
-        for lane in 0..V::N {
-            if wins >> lane & 1 != 0 {
-                self.prim[lane] = prim;
-                self.inst[lane] = inst;
-            }
+        if V::N == 1 {
+            (self.prim[0], self.inst[0]) = (prim, inst);
+            return;
         }
+        let wins = <f32x16 as Lanes>::Mask::from_bits(wins);
+        self.prim = merge(wins, prim, self.prim);
+        self.inst = merge(wins, inst, self.inst);
     }
 
     /// One lane as hits of width 1.
@@ -183,10 +186,8 @@ impl<V: Lanes> HitPacket<V> {
     #[inline(always)]
     pub fn store(&self, hits: &mut Hits<V::Scalar>, first: usize) {
         const { assert!(PAD.is_multiple_of(MAX_LANES)) };
-        let mut found = 0;
-        for lane in 0..V::N {
-            found |= u32::from(self.prim[lane] != INVALID_ID) << lane;
-        }
+        let found =
+            if V::N == 1 { u32::from(self.prim[0] != INVALID_ID) } else { !positions(&self.prim, INVALID_ID) & V::ALL };
         V::select(V::Mask::from_bits(found), self.t, V::splat(V::Scalar::INFINITY)).store(&mut hits.t[first..]);
         self.u.store(&mut hits.u[first..]);
         self.v.store(&mut hits.v[first..]);

@@ -1,7 +1,7 @@
 //! Rays through one point, as a camera makes them: what an engine can make itself, in coordinates of its own.
 
 use super::Rays;
-use crate::lanes::Real;
+use crate::lanes::{Real, each};
 
 /// Pixels along the edge of the largest square of rays.
 pub const EDGE: usize = 32;
@@ -107,7 +107,7 @@ impl Pencil {
         let count = self.len();
         rays.prepare(count);
         for axis in 0..3 {
-            let [right, up, forward] = [0, 1, 2].map(|k| self.axes[k][axis]);
+            let [right, up, forward] = each(|k| self.axes[k][axis]);
             rays.org[axis][..count].fill(S::from_f64(self.origin[axis]));
             self.places.combine(&mut rays.dir[axis][..count], |a| a * right, |b| b * up, |a, b| a + b + forward);
         }

@@ -9,7 +9,7 @@
 //! to rounding (Ize, "Robust BVH ray traversal", JCGT 2(2), 2013).
 
 use super::packet::Packet;
-use crate::lanes::{Lanes, Lanes3, Real};
+use crate::lanes::{Lanes, Lanes3, Real, each};
 
 /// Where lines pass through a box, before the ray's segment is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +33,7 @@ impl<V: Lanes> Interval<V> {
     /// `N` lines, given by origin and [`crate::lanes::finite_rcp`] of the direction, against one box.
     #[inline(always)]
     pub fn of_line(org: Lanes3<V>, rcp: Lanes3<V>, lo: [V::Scalar; 3], hi: [V::Scalar; 3]) -> Self {
-        let [x, y, z] = [0, 1, 2].map(|a| {
+        let [x, y, z] = each(|a| {
             let t0 = (V::splat(lo[a]) - org[a]) * rcp[a];
             let t1 = (V::splat(hi[a]) - org[a]) * rcp[a];
             (t0.fast_min(t1), t0.fast_max(t1))

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each};
 
 /// Entry and exit of `N` lines through a convex solid, before the segment is looked at. A tangent line gives an
 /// empty span (`t_in == t_out`) or none, never a single boundary: parity is preserved for CSG. Bounds at infinity
@@ -99,7 +99,7 @@ pub fn nearest_to_origin<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>) -> (Lanes3<V>, V)
     let square = crate::lanes::dot(d, d);
     let step = |o: Lanes3<V>| {
         let shift = -(crate::lanes::dot(o, d) / square);
-        ([0, 1, 2].map(|a| d[a].mul_add(shift, o[a])), shift)
+        (each(|a| d[a].mul_add(shift, o[a])), shift)
     };
     let (rough, first) = step(o);
     let (near, second) = step(rough);

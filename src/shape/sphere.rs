@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::span::{Solid, Span, nearest_to_origin};
-use crate::lanes::{Lanes, Lanes3, Real, dot};
+use crate::lanes::{Lanes, Lanes3, Real, dot, each};
 use crate::math::Aabb;
 
 /// The canonical sphere: unit radius at the local origin.
@@ -55,7 +55,7 @@ impl WorldSphere {
     /// Where lines are inside.
     #[inline(always)]
     pub fn span<V: Lanes>(org: Lanes3<V>, dir: Lanes3<V>, n: &SphereRecord<V::Scalar>) -> Span<V> {
-        let o = [0, 1, 2].map(|a| org[a] - V::splat(n[a]));
+        let o = each(|a| org[a] - V::splat(n[a]));
         sphere_span(o, dir, V::splat(n[3]))
     }
 }

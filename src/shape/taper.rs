@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::quartic;
 use super::span::{Span, nearest_to_origin};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each};
 
 /// How much wider than the solid the interval is in which roots are looked for.
 const ROOM: f64 = 1.0 / 256.0;
@@ -38,7 +38,7 @@ pub fn taper<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, [x, y]: [V::Scalar; 2], mut e
     }
     let half = V::constant(0.5);
     let (middle, reach) = (half * (within.t_in + within.t_out), half * (within.t_out - within.t_in));
-    let at = [0, 1, 2].map(|a| d[a].mul_add(middle, o[a]));
+    let at = each(|a| d[a].mul_add(middle, o[a]));
     let d = d.map(|c| c * reach);
     let one = V::constant(1.0);
     let radius = |top: V::Scalar| {

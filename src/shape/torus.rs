@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::quartic;
 use super::span::{Span, nearest_to_origin};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each};
 
 /// How much wider than the solid the interval is in which roots are looked for: its ends are outside.
 const ROOM: f64 = 1.0 / 256.0;
@@ -61,7 +61,7 @@ impl<V: Lanes> Part<V> {
         }
         let half = V::constant(0.5);
         let (middle, reach) = (half * (from + to), half * (to - from));
-        let o = [0, 1, 2].map(|a| d[a].mul_add(middle, o[a]));
+        let o = each(|a| d[a].mul_add(middle, o[a]));
         Some(Self { o, d: d.map(|x| x * reach), middle, reach, met })
     }
 }

@@ -17,7 +17,8 @@
 use glam::DVec3;
 
 use super::block::{BLOCK, Block};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot};
+use crate::lanes::chosen::lanes_of;
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, map3};
 use crate::math::Aabb;
 use crate::ray::slab::{Interval, pad};
 use crate::ray::{Candidate, Packet};
@@ -115,23 +116,36 @@ impl Triangle {
         lanes: u32,
         found: &mut impl FnMut(&Candidate<V>, u32, u32),
     ) {
-        let mut wanted = slots;
         if V::N == 1 {
-            // A single ray tests the whole block at once and looks closer where it is not outside.
+            // A single ray tests the whole block at once.
             let ray = packet.single(0);
-            let turned = Turned::of(&ray, K);
-            wanted &= Self::candidates(&turned, ray.t_min, t_max.lane(0), block).0;
-        }
-        while wanted != 0 {
-            let i = wanted.trailing_zeros() as usize & (BLOCK - 1);
-            wanted &= wanted - 1;
-            let corners = |f: usize| V::splat(block.fields[f][i]);
-            let edges = Edges::new(around(packet.org, K), packet.shear, K, corners);
-            let maybe = !edges.outside() & V::Mask::from_bits(lanes);
-            if maybe.any() {
-                let candidate = Self::accept(packet, &block.get(i), maybe, edges.functions);
+            let (maybe, edges) = Self::candidates(&Turned::of(&ray, K), ray.t_min, t_max.lane(0), block);
+            let mut functions = [[V::Scalar::ZERO; BLOCK]; 3];
+            functions.iter_mut().zip(edges).for_each(|(to, edge)| edge.store(to));
+            for i in lanes_of(slots & maybe) {
+                let functions = map3(functions, |f| V::splat(f[i & (BLOCK - 1)]));
+                let candidate = Self::accept(packet, &block.get(i), V::Mask::from_bits(lanes), functions);
                 found(&candidate, lanes, block.prim[i]);
             }
+            return;
+        }
+        let org = around(packet.org, K);
+        let edges = |i: usize| Edges::new(org, packet.shear, K, |f| V::splat(block.fields[f][i]));
+        // First which are to be looked at closer, without a branch on any of them: it would be a surprise, and each would
+        // wait for the one before.
+        let (mut maybe, mut wanted) = ([0; BLOCK], 0);
+        for i in lanes_of(slots) {
+            let i = i & (BLOCK - 1);
+            let edges = edges(i);
+            let aside = edges.aside(packet.rcp[K], packet.t_min, t_max);
+            maybe[i] = (!(edges.outside() | aside)).bits() & lanes;
+            wanted |= u32::from(maybe[i] != 0) << i;
+        }
+        for i in lanes_of(wanted) {
+            let i = i & (BLOCK - 1);
+            let maybe = V::Mask::from_bits(maybe[i]);
+            let candidate = Self::accept(packet, &block.get(i), maybe, edges(i).functions);
+            found(&candidate, lanes, block.prim[i]);
         }
     }
 
@@ -141,11 +155,8 @@ impl Triangle {
     pub fn candidates<S: Real>(ray: &Turned<S>, t_min: S, t_max: S, block: &TriangleBlock<S>) -> (u32, [S::Octo; 3]) {
         let rcp = S::Octo::splat(ray.rcp);
         let corners = |f: usize| S::Octo::load(&block.fields[f]);
-        let edges = Edges::new(ray.org.map(S::Octo::splat), ray.shear.map(S::Octo::splat), ray.axis, corners);
-        // The same slab as that of the triangle's own box, which its parameter is moved into.
-        let [a, b, c] = edges.depth.map(|z| z * rcp);
-        let (near, far) = (a.fast_min(b).fast_min(c), a.fast_max(b).fast_max(c));
-        let aside = S::Octo::splat(t_max).cmp_lt(near) | pad(far).cmp_lt(S::Octo::splat(t_min));
+        let edges = Edges::new(map3(ray.org, S::Octo::splat), map3(ray.shear, S::Octo::splat), ray.axis, corners);
+        let aside = edges.aside(rcp, S::Octo::splat(t_min), S::Octo::splat(t_max));
         ((!(edges.outside() | aside)).bits(), edges.functions)
     }
 
@@ -160,8 +171,8 @@ impl Triangle {
     fn accept<V: Lanes>(packet: &Packet<V>, n: &[V::Scalar; 9], maybe: V::Mask, [u, v, w]: [V; 3]) -> Candidate<V> {
         let det = u + v + w;
         let inv = V::constant(1.0) / det;
-        let plane = unit_normal(n).map(|x| V::splat(V::Scalar::from_f64(x)));
-        let corner = [0, 1, 2].map(|a| V::splat(n[a]) - packet.org[a]);
+        let plane = map3(unit_normal(n), |x| V::splat(V::Scalar::from_f64(x)));
+        let corner = each(|a| V::splat(n[a]) - packet.org[a]);
         let t = dot(plane, corner) / dot(plane, packet.dir);
         let mut found = Candidate { hit: maybe, t, u: v * inv, v: w * inv };
         let own = Self::bounds(n);
@@ -190,7 +201,7 @@ impl Triangle {
     /// (`0 * rcp`), one in the lower face has it begin at 0, and neither says anything about where the triangle is.
     #[inline(always)]
     fn along_a_face<V: Lanes>(packet: &Packet<V>) -> V::Mask {
-        let [x, y, z] = packet.dir.map(|d| d.abs().cmp_lt(V::splat(V::Scalar::MIN_POSITIVE)));
+        let [x, y, z] = map3(packet.dir, |d| d.abs().cmp_lt(V::splat(V::Scalar::MIN_POSITIVE)));
         x | y | z
     }
 
@@ -235,7 +246,7 @@ impl Triangle {
 /// of products; Jeannerod, Louvet, Muller, "Further analysis of Kahan's algorithm", Math. Comp. 82, 2013).
 #[inline(always)]
 fn unit_normal<S: Real>(n: &[S; 9]) -> [f64; 3] {
-    let edge = |i: usize| [0, 1, 2].map(|a| n[i + a].to_f64() - n[a].to_f64());
+    let edge = |i: usize| each(|a| n[i + a].to_f64() - n[a].to_f64());
     let (p, q) = (edge(3), edge(6));
     let minor = |a: usize, b: usize| {
         if S::EPSILON.to_f64() > f64::EPSILON {
@@ -249,13 +260,13 @@ fn unit_normal<S: Real>(n: &[S; 9]) -> [f64; 3] {
     let normal = [minor(1, 2), minor(2, 0), minor(0, 1)];
     let exponent = normal[0].abs().max(normal[1].abs()).max(normal[2].abs()).to_bits() >> 52;
     let scale = f64::from_bits((2046 - exponent.min(2045)) << 52);
-    normal.map(|x| x * scale)
+    map3(normal, |x| x * scale)
 }
 
 /// The components along an axis and the two that follow it.
 #[inline(always)]
 pub fn around<T: Copy>(v: [T; 3], axis: usize) -> [T; 3] {
-    AROUND[axis & 3].map(|a| v[a])
+    map3(AROUND[axis & 3], |a| v[a])
 }
 
 /// Each axis with the two that follow it; the last row fills up to a power of two.
@@ -311,6 +322,15 @@ impl<V: Lanes> Edges<V> {
         let [u, v, w] = self.functions;
         let (low, high) = (u.fast_min(v).fast_min(w), u.fast_max(v).fast_max(w));
         low.cmp_lt(zero) & zero.cmp_lt(high)
+    }
+
+    /// Pairs whose corners are all beyond `t_max` or all before `t_min`; `rcp`: of the directions along the dominant axis.
+    #[inline(always)]
+    fn aside(&self, rcp: V, t_min: V, t_max: V) -> V::Mask {
+        // The same slab as that of the triangle's own box, which its parameter is moved into.
+        let [a, b, c] = map3(self.depth, |z| z * rcp);
+        let (near, far) = (a.fast_min(b).fast_min(c), a.fast_max(b).fast_max(c));
+        t_max.cmp_lt(near) | pad(far).cmp_lt(t_min)
     }
 }
 

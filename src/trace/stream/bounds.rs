@@ -7,7 +7,7 @@
 use super::chunk::{Chunk, RAYS};
 use super::node::Planes;
 use crate::bvh::WIDTH;
-use crate::lanes::{LaneMask, Lanes, Real};
+use crate::lanes::{LaneMask, Lanes, Real, each};
 use crate::ray::slab::{Interval, pad};
 
 /// Least and greatest values over a chunk.
@@ -33,7 +33,7 @@ impl<S: Real> Bounds<S> {
             }
             (low.range(V::ALL).0, high.range(V::ALL).1)
         };
-        let (org, rcp) = ([0, 1, 2].map(|a| range(&chunk.org[a])), [0, 1, 2].map(|a| range(&chunk.rcp[a])));
+        let (org, rcp) = (each(|a| range(&chunk.org[a])), each(|a| range(&chunk.rcp[a])));
         Self { org, rcp, t_min: range(&chunk.t_min).0, t_max: range(t).1 }
     }
 
@@ -41,7 +41,7 @@ impl<S: Real> Bounds<S> {
     #[inline(always)]
     pub fn children(&self, planes: &Planes<'_, S>, octant: usize) -> u32 {
         let splat = S::Octo::splat;
-        let [x, y, z] = [0, 1, 2].map(|a| {
+        let [x, y, z] = each(|a| {
             let (low, high) = self.org[a];
             let (org_near, org_far) = if octant >> a & 1 == 0 { (high, low) } else { (low, high) };
             let (r0, r1) = (splat(self.rcp[a].0), splat(self.rcp[a].1));

@@ -3,7 +3,7 @@
 use super::OCTANTS;
 use super::bounds::Bounds;
 use crate::lanes::words::transpose_bits;
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, map3};
 use crate::ray::slab::Interval;
 use crate::ray::{Candidate, HitPacket, Hits, INVALID_ID, Packet, Rays};
 use crate::scene::world::Instance;
@@ -99,8 +99,8 @@ impl<S: Real> Chunk<S> {
         self.len = ids.len().min(RAYS);
         // Columns of one known length, so that a ray's number is looked at once instead of eight times.
         let n = rays.padded_len();
-        let [ox, oy, oz] = [0, 1, 2].map(|a| &rays.org[a][..n]);
-        let [dx, dy, dz] = [0, 1, 2].map(|a| &rays.dir[a][..n]);
+        let [ox, oy, oz] = each(|a| &rays.org[a][..n]);
+        let [dx, dy, dz] = each(|a| &rays.dir[a][..n]);
         let (t_min, t_max) = (&rays.t_min[..n], &rays.t_max[..n]);
         for (i, &id) in ids.iter().enumerate().take(RAYS) {
             let id = (id as usize).min(n - 1);
@@ -179,7 +179,7 @@ impl<S: Real> Chunk<S> {
 
     /// About that: entries after the last ray count too, as far as the vectors go.
     fn sum_of_directions<V: Lanes<Scalar = S>>(&self) -> [S; 3] {
-        [0, 1, 2].map(|a| {
+        each(|a| {
             let mut sums = [S::ZERO; MAX_LANES];
             let vectors = (0..self.len).step_by(V::N).map(|at| V::load(&self.dir[a][at..]));
             vectors.fold(V::constant(0.0), |sum, next| sum + next).store(&mut sums);
@@ -193,10 +193,10 @@ impl<S: Real> Chunk<S> {
         store3(packet.rcp, &mut self.rcp, at);
         store3(packet.shear, &mut self.shear, at);
         packet.t_floor.store(&mut self.t_floor[at..]);
-        let dominant = packet.dominant.map(V::Mask::from_bits);
-        let turned = [0, 1, 2].map(|axis| around(packet.org, axis));
+        let dominant = map3(packet.dominant, V::Mask::from_bits);
+        let turned = each(|axis| around(packet.org, axis));
         let pick = |i: usize| V::select(dominant[0], turned[0][i], V::select(dominant[1], turned[1][i], turned[2][i]));
-        store3([0, 1, 2].map(pick), &mut self.around, at);
+        store3(each(pick), &mut self.around, at);
         let [_, y, z] = packet.dominant;
         self.axis[at..at + V::N].copy_from_slice(&transpose_bits([y, z])[..V::N]);
         for (mask, bits) in self.dominant.iter_mut().zip(packet.dominant) {
@@ -221,7 +221,7 @@ impl<S: Real> Chunk<S> {
             rcp: load3(&self.rcp, at),
             t_min: V::load(&self.t_min[at..]),
             t_floor: V::load(&self.t_floor[at..]),
-            dominant: self.dominant.map(|mask| (mask >> at) as u32 & V::ALL),
+            dominant: map3(self.dominant, |mask| (mask >> at) as u32 & V::ALL),
             shear: load3(&self.shear, at),
         }
     }

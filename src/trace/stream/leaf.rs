@@ -3,7 +3,7 @@
 use super::chunk::{Chunk, RAYS, Set};
 use super::walk::Walk;
 use crate::bvh::Child;
-use crate::lanes::{Lanes, Real};
+use crate::lanes::{Lanes, Real, each};
 use crate::ray::{HitPacket, Packet};
 use crate::scene::world::{Class, Object};
 use crate::shape::{BLOCK, Triangle};
@@ -177,7 +177,7 @@ fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
         let turn = usize::from(walk.pairs.turn[at]) & (RAYS - 1);
         let (ray, slot) =
             (usize::from(walk.pairs.ray[turn]) & (RAYS - 1), usize::from(walk.pairs.slot[at]) & (BLOCK - 1));
-        let edges = [0, 1, 2].map(|k| walk.pairs.edges[turn][k][slot]);
+        let edges = each(|k| walk.pairs.edges[turn][k][slot]);
         let found = Triangle::look_closer(&chunk.packet::<S>(ray), &block.get(slot), edges);
         if ANY {
             walk.best.done |= Set::from(found.hit & (found.t <= walk.best.t[ray])) << ray;

@@ -23,7 +23,7 @@ use super::output::Output;
 use super::query::{Query, Stack};
 use super::{Engine, Engines, Scratch, traverse};
 use crate::lanes::words::{prefetch, transpose_bits};
-use crate::lanes::{LaneMask, Lanes, Real};
+use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
 use chunk::{Best, Chunk, RAYS};
@@ -79,7 +79,7 @@ impl Signs {
     #[inline(always)]
     fn of<V: Lanes>(packet: &Packet<V>) -> Self {
         // The sign of the reciprocal, without a division.
-        let [x, y, z] = packet.dir.map(|d| d.cmp_le(V::splat(-V::Scalar::MIN_POSITIVE)).bits());
+        let [x, y, z] = map3(packet.dir, |d| d.cmp_le(V::splat(-V::Scalar::MIN_POSITIVE)).bits());
         Self([x, y, z, packet.dominant[1], packet.dominant[2]])
     }
 
@@ -92,7 +92,7 @@ impl Signs {
     /// Whether they have the same direction along two axes or all.
     #[inline(always)]
     fn nearly_agree(&self, live: u32) -> bool {
-        let [x, y, z] = [0, 1, 2].map(|axis| u32::from(self.0[axis] & live == 0 || self.0[axis] & live == live));
+        let [x, y, z] = each(|axis| u32::from(self.0[axis] & live == 0 || self.0[axis] & live == live));
         x + y + z >= 2
     }
 }

@@ -3,7 +3,7 @@
 use super::chunk::{Chunk, RAYS, Set};
 use crate::bvh::{Node, WIDTH};
 use crate::lanes::words::Marks;
-use crate::lanes::{LaneMask, Lanes, Real};
+use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::slab::{Interval, pad};
 
 /// From this many rays on they are tested as vectors.
@@ -34,7 +34,7 @@ pub type Planes<'a, S> = [(&'a [S; WIDTH], &'a [S; WIDTH]); 3];
 
 #[inline(always)]
 fn planes<S>(node: &Node<S>, octant: usize) -> Planes<'_, S> {
-    [0, 1, 2].map(|axis| {
+    each(|axis| {
         let [low, high] = &node.bounds[axis];
         if octant >> axis & 1 == 0 { (low, high) } else { (high, low) }
     })
@@ -65,7 +65,7 @@ fn sparse<S: Real, const ANY: bool>(
     rays: Set,
     octant: usize,
 ) -> Met<S> {
-    let planes = planes(node, octant).map(|(near, far)| (S::Octo::load(near), S::Octo::load(far)));
+    let planes = map3(planes(node, octant), |(near, far)| (S::Octo::load(near), S::Octo::load(far)));
     let mut marks = [Marks::none(); 2];
     let mut first = S::Octo::splat(S::INFINITY);
     for (half, marks) in marks.iter_mut().enumerate() {
@@ -74,7 +74,7 @@ fn sparse<S: Real, const ANY: bool>(
             let i = rest.trailing_zeros();
             rest &= rest - 1;
             let ray = (64 * half + i as usize) & (RAYS - 1);
-            let [x, y, z] = [0, 1, 2].map(|a| {
+            let [x, y, z] = each(|a| {
                 let (org, rcp) = (S::Octo::splat(chunk.org[a][ray]), S::Octo::splat(chunk.rcp[a][ray]));
                 ((planes[a].0 - org) * rcp, (planes[a].1 - org) * rcp)
             });
@@ -110,11 +110,11 @@ fn dense<V: Lanes, const ANY: bool>(
     while rest != 0 {
         let child = rest.trailing_zeros() as usize & (WIDTH - 1);
         rest &= rest - 1;
-        let corner = planes.map(|(near, far)| (V::splat(near[child]), V::splat(far[child])));
+        let corner = map3(planes, |(near, far)| (V::splat(near[child]), V::splat(far[child])));
         let mut meeting = [0u64; 2];
         for (half, meeting) in meeting.iter_mut().enumerate() {
             for at in (64 * half..chunk.len.min(64 * half + 64)).step_by(V::N) {
-                let [x, y, z] = [0, 1, 2].map(|a| {
+                let [x, y, z] = each(|a| {
                     let (org, rcp) = (V::load(&chunk.org[a][at..]), V::load(&chunk.rcp[a][at..]));
                     ((corner[a].0 - org) * rcp, (corner[a].1 - org) * rcp)
                 });
@@ -132,7 +132,7 @@ fn dense<V: Lanes, const ANY: bool>(
         // How far the near corner lies along the mean direction.
         let along = |a: usize| V::Scalar::splat(chunk.mean[a]);
         for (child, near) in met.near.iter_mut().enumerate() {
-            let [x, y, z] = [0, 1, 2].map(|a| planes[a].0[child] * along(a));
+            let [x, y, z] = each(|a| planes[a].0[child] * along(a));
             *near = x + y + z;
         }
     }

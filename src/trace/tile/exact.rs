@@ -2,8 +2,9 @@
 
 use super::batch::Planes;
 use super::bundle::Bundle;
-use super::groups::{Groups, NO_SLOT, bounded, merge};
+use super::groups::{Groups, NO_SLOT, bounded};
 use super::{Mask, V, select};
+use crate::lanes::chosen::merge;
 use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes, each};
 use crate::ray::{Candidate, HitPacket, INVALID_ID, Packet};

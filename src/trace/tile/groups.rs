@@ -318,12 +318,6 @@ pub fn splats(bounds: &[[f32; 2]; 2]) -> [[V; 2]; 2] {
     [[V::splat(s0), V::splat(s1)], [V::splat(t0), V::splat(t1)]]
 }
 
-/// `new` where the mask is set. Numbers are moved as floats: selection copies bits.
-#[inline(always)]
-pub fn merge(mask: Mask, new: u32, old: [u32; 16]) -> [u32; 16] {
-    bytemuck::cast(select(mask, V::splat(f32::from_bits(new)), V::new(bytemuck::cast(old))).to_array())
-}
-
 /// Infinite bounds become the largest number: the lane still wants to hear of hits at zero distance.
 #[inline(always)]
 pub fn bounded(inv_lo: V) -> V {
