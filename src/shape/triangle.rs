@@ -17,7 +17,6 @@
 use glam::DVec3;
 
 use super::block::{BLOCK, Block};
-use crate::lanes::chosen::lanes_of;
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, map3};
 use crate::math::Aabb;
 use crate::ray::slab::{Interval, pad};
@@ -116,33 +115,30 @@ impl Triangle {
         lanes: u32,
         found: &mut impl FnMut(&Candidate<V>, u32, u32),
     ) {
-        if V::N == 1 {
-            // A single ray tests the whole block at once.
-            let ray = packet.single(0);
-            let (maybe, edges) = Self::candidates(&Turned::of(&ray, K), ray.t_min, t_max.lane(0), block);
-            let mut functions = [[V::Scalar::ZERO; BLOCK]; 3];
-            functions.iter_mut().zip(edges).for_each(|(to, edge)| edge.store(to));
-            for i in lanes_of(slots & maybe) {
-                let functions = map3(functions, |f| V::splat(f[i & (BLOCK - 1)]));
-                let candidate = Self::accept(packet, &block.get(i), V::Mask::from_bits(lanes), functions);
-                found(&candidate, lanes, block.prim[i]);
-            }
-            return;
-        }
         let org = around(packet.org, K);
         let edges = |i: usize| Edges::new(org, packet.shear, K, |f| V::splat(block.fields[f][i]));
         // First which are to be looked at closer, without a branch on any of them: it would be a surprise, and each would
         // wait for the one before.
         let (mut maybe, mut wanted) = ([0; BLOCK], 0);
-        for i in lanes_of(slots) {
-            let i = i & (BLOCK - 1);
-            let edges = edges(i);
-            let aside = edges.aside(packet.rcp[K], packet.t_min, t_max);
-            maybe[i] = (!(edges.outside() | aside)).bits() & lanes;
-            wanted |= u32::from(maybe[i] != 0) << i;
+        if V::N == 1 {
+            // A single ray tests the whole block at once.
+            let ray = packet.single(0);
+            wanted = slots & Self::candidates(&Turned::of(&ray, K), ray.t_min, t_max.lane(0), block).0;
+            maybe = [lanes; BLOCK];
+        } else {
+            let mut rest = slots;
+            while rest != 0 {
+                let i = rest.trailing_zeros() as usize & (BLOCK - 1);
+                rest &= rest - 1;
+                let edges = edges(i);
+                let aside = edges.aside(packet.rcp[K], packet.t_min, t_max);
+                maybe[i] = (!(edges.outside() | aside)).bits() & lanes;
+                wanted |= u32::from(maybe[i] != 0) << i;
+            }
         }
-        for i in lanes_of(wanted) {
-            let i = i & (BLOCK - 1);
+        while wanted != 0 {
+            let i = wanted.trailing_zeros() as usize & (BLOCK - 1);
+            wanted &= wanted - 1;
             let maybe = V::Mask::from_bits(maybe[i]);
             let candidate = Self::accept(packet, &block.get(i), maybe, edges(i).functions);
             found(&candidate, lanes, block.prim[i]);
