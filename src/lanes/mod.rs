@@ -14,6 +14,7 @@
 
 pub mod chosen;
 mod ftz;
+pub mod functions;
 mod isa;
 mod moved;
 mod pair;

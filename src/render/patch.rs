@@ -57,12 +57,13 @@ impl Patch {
         let kept = self.kept.iter().map(|&number| number as usize);
         let (color, further) = self.values.split_at_mut(COLOR.len());
         if let [PlaneData::F32(r), PlaneData::F32(g), PlaneData::F32(b), PlaneData::F32(a)] = color {
-            [&mut *r, &mut *g, &mut *b, &mut *a].into_iter().for_each(Vec::clear);
-            for Rgba { radiance, alpha } in kept.clone().map(|number| finished.color(number)) {
-                r.push(radiance.x as f32);
-                g.push(radiance.y as f32);
-                b.push(radiance.z as f32);
-                a.push(alpha as f32);
+            for list in [&mut *r, &mut *g, &mut *b, &mut *a] {
+                list.resize(self.kept.len(), 0.0);
+            }
+            let lists = r.iter_mut().zip(g).zip(b.iter_mut().zip(a));
+            for (((r, g), (b, a)), number) in lists.zip(kept.clone()) {
+                let Rgba { radiance, alpha } = finished.color(number);
+                (*r, *g, *b, *a) = (radiance.x as f32, radiance.y as f32, radiance.z as f32, alpha as f32);
             }
         }
         if further.is_empty() {

@@ -90,8 +90,14 @@ impl Finished<'_> {
     /// Colour of pixel `i`.
     #[inline]
     pub fn color(&self, i: usize) -> Rgba {
-        let (sum, count) = self.sum(i);
-        mean(&sum, count)
+        match self {
+            // 0 + -0 is 0, as in a sum.
+            Self::Samples(samples) => {
+                let Rgba { radiance, alpha } = samples.colors[i];
+                Rgba { radiance: DVec3::ZERO + radiance, alpha: 0.0 + alpha }
+            }
+            Self::Sums(sums, count) => mean(&sums.colors[i], *count),
+        }
     }
 
     /// Pixel `i`.

@@ -17,6 +17,7 @@ use glam::DVec3;
 pub use crate::bvh::{BuildSettings, Preset};
 pub use facets::Met;
 pub use rounding::Rounding;
+pub use runs::Place;
 pub use surface::Surface;
 
 use self::facets::Facets;

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
+use crate::lanes::{Lanes, Lanes3, dot, each};
 use crate::math::NormalMap;
 use crate::scene::assembly::{AssemblyObject, PartKind};
 use crate::scene::description::Description;
@@ -38,6 +39,16 @@ impl Place {
     #[inline]
     pub fn local(&self, point: DVec3) -> DVec3 {
         self.to_local.transform_point3(point)
+    }
+
+    /// The same of the points of lanes.
+    #[inline]
+    pub fn local_lanes<V: Lanes>(&self, point: Lanes3<V>) -> Lanes3<V> {
+        let (rows, from) = (self.to_local.matrix3.transpose(), self.to_local.translation);
+        each(|k| {
+            let row = rows.col(k);
+            dot(each(|axis| V::constant(row[axis])), point) + V::constant(from[k])
+        })
     }
 
     /// A normal of the shape's space in the other one, unit.

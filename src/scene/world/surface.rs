@@ -133,11 +133,10 @@ impl<S: Real> World<S> {
         }
     }
 
-    /// `point`, in the space of `object`, in that of its shape or leaf `prim`; as it is for triangles.
-    pub fn local(&self, object: u32, prim: u32, point: DVec3) -> DVec3 {
+    /// Where shape or leaf `prim` of `object` stands in the object's space; `None` for triangles.
+    pub fn place(&self, object: u32, prim: u32) -> Option<Place> {
         let (run, kept) = self.runs[object as usize].placed(prim);
-        let place = kept.copied().or_else(|| runs::place(&self.assembly.objects[object as usize], &run));
-        place.map_or(point, |place| place.local(point))
+        kept.copied().or_else(|| runs::place(&self.assembly.objects[object as usize], &run))
     }
 
     /// Material of primitive `prim` of `object`: an index into the description's materials.

@@ -3,18 +3,28 @@
 use glam::DVec3;
 
 use super::{Carry, Path, TOLERANCE};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, space};
+use crate::lanes::chosen::{at, lanes_of, spill};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, map3, space};
 use crate::ray::{Hits, Rays};
 use crate::scene::world::World;
+use crate::shade::sample::Samples;
 
 /// Roundings of a point on a surface that a ray from there may still meet the surface within.
 const ROUNDINGS: f64 = 64.0;
 
 /// Where a ray from a point `org` on a surface begins to count: at the tolerance, which the digits of `f32` do not reach
 /// far from the origin.
-pub(super) fn start<S: Real>(org: [S; 3]) -> S {
-    let largest = org.iter().fold(S::ZERO, |most, x| most.fast_max(x.abs()));
-    S::from_f64(TOLERANCE).fast_max(largest * S::from_f64(ROUNDINGS * S::EPSILON.to_f64()))
+#[inline(always)]
+pub(super) fn start<V: Lanes>(org: Lanes3<V>) -> V {
+    let [x, y, z] = map3(org, V::abs);
+    let largest = x.fast_max(y).fast_max(z);
+    V::constant(TOLERANCE).fast_max(largest * V::constant(ROUNDINGS * V::Scalar::EPSILON.to_f64()))
+}
+
+/// Numbers `first..first + N` of three lists.
+#[inline(always)]
+pub(super) fn vector<S: Real>(from: &[Vec<S>; 3], first: usize) -> Lanes3<S::Wide> {
+    [S::Wide::load(&from[0][first..]), S::Wide::load(&from[1][first..]), S::Wide::load(&from[2][first..])]
 }
 
 /// Rays of paths.
@@ -24,20 +34,22 @@ pub(super) struct Level<S> {
     pub rays: Rays<S>,
     /// Parallel to the rays; none for primary rays, which all carry the same.
     carry: Vec<Carry>,
+    /// Of each vector of lanes: those inside glass; none for primary rays.
+    within: Vec<u32>,
 }
 
 impl<S: Real> Level<S> {
     /// The primary rays `rays`; dead ones stay dead.
     pub fn start(&mut self, rays: &Rays<S>) {
-        self.rays.reset(rays.len());
+        self.rays.open(rays.len());
         self.carry.clear();
+        self.within.clear();
         let tolerance = S::Wide::constant(TOLERANCE);
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
-            let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
-            let dir: Lanes3<S::Wide> = space::normalize(vector(&rays.dir));
-            for (axis, (org, dir)) in vector(&rays.org).into_iter().zip(dir).enumerate() {
-                org.store(&mut self.rays.org[axis][first..]);
-                dir.store(&mut self.rays.dir[axis][first..]);
+            let (org, dir) = (vector(&rays.org, first), space::normalize(vector(&rays.dir, first)));
+            for axis in 0..3 {
+                org[axis].store(&mut self.rays.org[axis][first..]);
+                dir[axis].store(&mut self.rays.dir[axis][first..]);
             }
             tolerance.fast_max(S::Wide::load(&rays.t_min[first..])).store(&mut self.rays.t_min[first..]);
             S::Wide::load(&rays.t_max[first..]).store(&mut self.rays.t_max[first..]);
@@ -46,13 +58,17 @@ impl<S: Real> Level<S> {
 
     /// The paths `paths`.
     pub fn open(&mut self, paths: &[Path]) {
-        self.rays.reset(paths.len());
+        self.rays.open(paths.len());
         self.carry.clear();
+        self.within.clear();
+        self.within.resize(self.rays.padded_len() / S::Wide::N, 0);
         for (i, path) in paths.iter().enumerate() {
-            let (org, dir) = (path.org.to_array().map(S::from_f64), path.dir.to_array().map(S::from_f64));
+            let (org, dir) = (map3(path.org.to_array(), S::from_f64), map3(path.dir.to_array(), S::from_f64));
             self.rays.set(i, org, dir, start(org), S::INFINITY);
+            self.within[i / S::Wide::N] |= u32::from(path.carry.within.is_some()) << (i % S::Wide::N);
             self.carry.push(path.carry);
         }
+        self.rays.close(paths.len());
     }
 
     /// Number of rays.
@@ -66,9 +82,25 @@ impl<S: Real> Level<S> {
         self.carry.get(i).copied().unwrap_or_else(|| Carry::new(i as u32))
     }
 
-    /// Whether ray `i` is one at all.
-    pub fn is_live(&self, i: usize) -> bool {
-        self.rays.t_min[i] <= self.rays.t_max[i]
+    /// Of vector `k` of lanes those that are rays at all, and those of them that are inside glass.
+    #[inline]
+    pub fn lanes(&self, k: usize) -> [u32; 2] {
+        let load = |from: &[S]| S::Wide::load(&from[k * S::Wide::N..]);
+        let live = load(&self.rays.t_min).cmp_le(load(&self.rays.t_max)).bits();
+        [live, live & self.within.get(k).copied().unwrap_or(0)]
+    }
+
+    /// Adds what rays `first + lane` of `lanes` show, each its own of `color`, to their pixels.
+    #[inline]
+    pub fn show(&self, first: usize, lanes: u32, color: Lanes3<S::Wide>, out: &mut Samples) {
+        let color = spill(color);
+        for lane in lanes_of(lanes) {
+            let color = DVec3::from(map3(at(&color, lane), S::to_f64));
+            match self.carry.get(first + lane) {
+                None => out.colors[first + lane].radiance += color,
+                Some(carry) => out.colors[carry.pixel as usize].radiance += carry.throughput * color,
+            }
+        }
     }
 
     /// Ray `i` with what it carries.
@@ -92,7 +124,7 @@ pub(super) struct Found<S> {
     /// Of each vector of lanes: those that met something.
     pub hit: Vec<u32>,
     /// Those that met it from inside.
-    leaving: Vec<u32>,
+    pub leaving: Vec<u32>,
 }
 
 impl<S: Real> Found<S> {
@@ -108,12 +140,12 @@ impl<S: Real> Found<S> {
         for first in (0..padded).step_by(S::Wide::N) {
             let met = world.met(rays, hits, first);
             self.hit.push(met.hit);
-            let dir: Lanes3<S::Wide> = each(|axis| S::Wide::load(&rays.dir[axis][first..]));
-            let leaving = S::Wide::constant(0.0).cmp_lt(dot(met.normal, dir)).bits();
-            self.leaving.push(leaving & met.hit);
             if met.hit == 0 {
+                self.leaving.push(0);
                 continue;
             }
+            let leaving = S::Wide::constant(0.0).cmp_lt(dot(met.normal, vector(&rays.dir, first))).bits();
+            self.leaving.push(leaving & met.hit);
             for axis in 0..3 {
                 met.position[axis].store(&mut self.position[axis][first..]);
                 met.normal[axis].store(&mut self.normal[axis][first..]);

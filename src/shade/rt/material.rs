@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use super::pattern::{Face, Pattern};
+use super::parameters::Face;
+use super::pattern::Pattern;
 use crate::scene::brlcad::describe::{Look, Looks};
 use crate::scene::brlcad::shader::Shader;
 
@@ -26,8 +27,10 @@ const GLASS: Finish = Finish { shine: 4.0, specular: 0.7, diffuse: 0.3, transmit
 /// How a region looks.
 #[derive(Clone, Debug)]
 pub(super) struct RtMaterial {
-    base: DVec3,
-    pattern: Option<Pattern>,
+    /// Its colour, without a pattern.
+    pub base: DVec3,
+    /// What its colour is instead.
+    pub pattern: Option<Pattern>,
     /// How it is lit; `None` shows its colour as it is.
     pub finish: Option<Finish>,
     /// Whether it is a light.
@@ -58,11 +61,6 @@ impl RtMaterial {
             material.finish = Some(PLASTIC);
         }
         material
-    }
-
-    /// Its colour where a pattern's parameters are what `uv` gives.
-    pub fn color(&self, uv: impl FnOnce() -> Option<[f64; 2]>) -> DVec3 {
-        self.pattern.as_ref().map_or(self.base, |pattern| pattern.color(uv().unwrap_or_default()))
     }
 
     /// Faces of the arb that it is, if it has a pattern.
@@ -123,7 +121,7 @@ mod tests {
         assert!(stack.pattern.is_some() && stack.finish.unwrap().shine == 20.0);
         let checker = material("checker a=0/0/150 b=0/0/150");
         assert!(checker.finish.is_none());
-        assert_eq!(checker.color(|| Some([0.1, 0.9])), DVec3::new(0.0, 0.0, 150.0 / 255.0));
+        assert_eq!(checker.pattern.unwrap().color([0.1, 0.9]), [0.0, 0.0, 150.0 / 255.0]);
         assert!(material("light").is_light && material("light").finish.is_none());
         assert_eq!(material("camo s=3").finish, Some(PLASTIC));
     }

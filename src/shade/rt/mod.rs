@@ -13,22 +13,26 @@ mod glass;
 mod lamp;
 mod level;
 mod material;
+mod meetings;
+mod parameters;
 mod pattern;
 mod phong;
 mod shadow;
+mod sort;
 
 use glam::DVec3;
 
 use self::lamp::Lamp;
 use self::level::{Found, Level};
 use self::material::RtMaterial;
-use self::phong::Meetings;
+use self::meetings::Meetings;
 use self::shadow::Probes;
 use super::sample::{FirstHit, Rgba, Samples};
 use super::shader::{Shader, Workspace};
 use crate::camera::Camera;
+use crate::lanes::chosen::lanes_of;
 use crate::lanes::{Lanes, Real};
-use crate::ray::{Hits, Rays};
+use crate::ray::Rays;
 use crate::scene::brlcad::describe::Looks;
 pub use material::unknown_shaders;
 use pattern::Pattern;
@@ -111,8 +115,12 @@ pub(super) struct Memory<S> {
     shadow: Found<S>,
     /// Rays that look back.
     back: Level<S>,
-    /// Of each vector of lanes: the primary rays that met something.
-    first: Vec<u32>,
+    /// Of each vector of lanes: those that meet nothing.
+    lost: Vec<u32>,
+    /// Those of them that are inside something without end.
+    inside: Vec<u32>,
+    /// Of each vector of primary rays: the live ones, and those that met something.
+    first: Vec<[u32; 2]>,
 }
 
 impl Rt {
@@ -130,7 +138,7 @@ impl<S: Real> Shader<'_, S> {
     pub(super) fn rt(&self, rt: &Rt, rays: &Rays<S>, work: &mut Workspace<S>, out: &mut Samples) {
         let mut memory = std::mem::take(&mut work.rt);
         memory.level.start(rays);
-        let (mut next, mut lost) = (Vec::new(), Vec::new());
+        let mut next = Vec::new();
         let mut is_primary = true;
         while memory.level.len() > 0 {
             self.intersect_all(&memory.level.rays, work);
@@ -138,97 +146,23 @@ impl<S: Real> Shader<'_, S> {
             if !is_primary {
                 work.rays.mirror += memory.level.len() as u64;
             } else {
-                memory.first.clone_from(&memory.found.hit);
-                see(&memory.found, &mut out.hits);
+                let Memory { first, found, level, .. } = &mut memory;
+                first.clear();
+                first.extend(found.hit.iter().enumerate().map(|(k, &hit)| [level.lanes(k)[0], hit]));
+                see(found, &mut out.hits);
             }
-            self.rt_sort(rt, &mut memory, &work.hits, &mut next, &mut lost, out);
-            self.rt_lost(rt, &lost, &mut memory, work, out);
+            self.rt_sort(rt, &mut memory, &work.hits, &mut next, out);
+            self.rt_lost(rt, &mut memory, work, out);
             self.rt_light(rt, &mut memory, &mut next, work, out);
             memory.level.open(&next);
             next.clear();
-            lost.clear();
             is_primary = false;
         }
-        for (first, hit) in (0..rays.len()).step_by(S::Wide::N).zip(&memory.first) {
-            let colors = out.colors[first..].iter_mut().take(S::Wide::N).enumerate();
-            colors.filter(|(lane, _)| hit >> lane & 1 != 0).for_each(|(_, color)| not_the_background(color));
+        for (first, &[live, hit]) in (0..rays.len()).step_by(S::Wide::N).zip(&memory.first) {
+            lanes_of(live).for_each(|lane| out.colors[first + lane].alpha = 1.0);
+            lanes_of(hit).for_each(|lane| not_the_background(&mut out.colors[first + lane]));
         }
         work.rt = memory;
-    }
-
-    /// Tells the hits of a level apart: paths that meet nothing go to `lost`, those that go on as they are to `next`,
-    /// those that enter regions to the meetings.
-    fn rt_sort(
-        &self,
-        rt: &Rt,
-        memory: &mut Memory<S>,
-        hits: &Hits<S>,
-        next: &mut Vec<Path>,
-        lost: &mut Vec<u32>,
-        out: &mut Samples,
-    ) {
-        let Memory { level, found, meetings, .. } = memory;
-        meetings.open(level.rays.padded_len());
-        for i in 0..level.len() {
-            if !level.is_live(i) {
-                continue;
-            }
-            let carry = level.carry(i);
-            out.colors[carry.pixel as usize].alpha = 1.0;
-            if carry.within.is_some() {
-                glass::step(level, i, found, next);
-            } else if !found.is_hit(i) {
-                lost.push(i as u32);
-            } else if found.is_leaving(i) {
-                if carry.left == Some(found.region[i]) && found.t[i].to_f64() < THIN {
-                    let path = level.path(i);
-                    next.push(Path { org: found.position(i), carry: Carry { left: None, ..carry }, ..path });
-                } else {
-                    let color = INSIDE.0 * INSIDE.1.powi((MAX_BOUNCES + 1).saturating_sub(carry.level) as i32);
-                    out.colors[carry.pixel as usize].radiance += carry.throughput * color;
-                }
-            } else {
-                let region = found.region[i];
-                let material = &rt.materials[region as usize];
-                let base = material.color(|| {
-                    let (position, normal) = (found.position(i), found.normal(i));
-                    let of_arb = || pattern::uv_of_arb(material.faces(), position, normal);
-                    pattern::uv(self.world, region, hits.prim[i], position, normal).or_else(of_arb)
-                });
-                meetings.add(i, base);
-            }
-        }
-    }
-
-    /// Rays that nothing stops: the surroundings, or the inside of a solid without end.
-    fn rt_lost(&self, rt: &Rt, lost: &[u32], memory: &mut Memory<S>, work: &mut Workspace<S>, out: &mut Samples) {
-        let Memory { level, back, shadow, .. } = memory;
-        let looks_back = rt.unbounded.contains(&true) && !lost.is_empty();
-        if looks_back {
-            // A ray that starts inside a region without bounds leaves it when it looks back.
-            let turned = |path: Path| Path { dir: -path.dir, ..path };
-            back.open(&lost.iter().map(|&i| turned(level.path(i as usize))).collect::<Vec<_>>());
-            self.intersect_all(&back.rays, work);
-            shadow.set(self.world, &back.rays, &work.hits);
-        }
-        // Rays of parallel projection all have one direction.
-        let mut last = (DVec3::ZERO, DVec3::ZERO);
-        for (k, &i) in lost.iter().enumerate() {
-            let inside = looks_back && shadow.is_leaving(k) && rt.unbounded[shadow.region[k] as usize];
-            let color = match &rt.surroundings {
-                _ if inside => DVec3::splat(INSIDE.0),
-                Some(pattern) => {
-                    let dir = level.path(i as usize).dir;
-                    if dir != last.0 {
-                        last = (dir, pattern.color(pattern::uv_of_direction(dir)));
-                    }
-                    last.1
-                }
-                None => BACKGROUND,
-            };
-            let carry = level.carry(i as usize);
-            out.colors[carry.pixel as usize].radiance += carry.throughput * color;
-        }
     }
 }
 

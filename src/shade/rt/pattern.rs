@@ -1,30 +1,18 @@
 //! Colours as functions of a surface's parameters: cloud, testmap, checker.
 //!
-//! Source of the clouds: G. Y. Gardner, "Visual Simulation of Clouds", SIGGRAPH 1985, with the constants and the table
-//! of sines that BRL-CAD uses.
+//! Source of the clouds: G. Y. Gardner, "Visual Simulation of Clouds", SIGGRAPH 1985, with the constants that BRL-CAD uses,
+//! and its sines, of which there are 2048.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::sync::LazyLock;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::DVec3;
 
-use crate::lanes::Real;
-use crate::scene::assembly::PartKind;
-use crate::scene::brlcad::ARB_FACES;
+use crate::lanes::functions::{fraction, round, sine_of_turns};
+use crate::lanes::{Lanes, Lanes3, each, space};
 use crate::scene::brlcad::shader::Shader;
-use crate::scene::description::Shape;
-use crate::scene::solids::Solid;
-use crate::scene::world::World;
 
-/// Entries of the table of sines.
-const SINES: usize = 2048;
-/// Period of a half-space's parameters, mm.
-const HALF_SPACE_PERIOD: f64 = 10_000.0;
-/// Points of an arb nearer than this are one.
-const SAME_POINT: f64 = 0.0005;
-
-static TABLE: LazyLock<Vec<f32>> =
-    LazyLock::new(|| (0..SINES).map(|i| (i as f64 * TAU / SINES as f64).sin() as f32).collect());
+/// Steps of a full turn that have a sine of their own.
+const SINES: f64 = 2048.0;
 
 /// A procedural colour.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,141 +47,66 @@ impl Pattern {
     }
 
     /// The colour at parameters u, v in 0..1.
-    pub fn color(&self, [u, v]: [f64; 2]) -> DVec3 {
+    #[inline]
+    pub fn color<V: Lanes>(&self, [u, v]: [V; 2]) -> Lanes3<V> {
         match self {
             Self::Cloud => cloud(u, v),
-            Self::Testmap => DVec3::new(u, 0.0, v),
+            Self::Testmap => [u, V::constant(0.0), v],
             Self::Checker { a, b, scale } => {
-                let odd = |x: f64| (x * scale) as i64 & 1;
-                if odd(u) == odd(v) { *a } else { *b }
+                // Halves of the numbers of squares, which are cut off towards zero.
+                let is_odd =
+                    |x: V| V::constant(0.5).cmp_le(fraction((x * V::constant(*scale)).abs() * V::constant(0.5)));
+                let (odd_u, odd_v) = (is_odd(u), is_odd(v));
+                let is_a = (odd_u & odd_v) | (!odd_u & !odd_v);
+                space::choose(is_a, a.to_array().map(V::constant), b.to_array().map(V::constant))
             }
         }
     }
 }
 
-/// The sine from the table, nearest entry.
-fn sine(angle: f64) -> f64 {
-    let entry = |a: f64| f64::from(TABLE[(0.5 + a * (SINES as f64 / TAU)) as usize & (SINES - 1)]);
-    if angle < 0.0 { -entry(-angle) } else { entry(angle) }
+/// The sine of the nearest step.
+#[inline(always)]
+fn sine<V: Lanes>(angle: V) -> V {
+    sine_of_turns(round(angle * V::constant(SINES / TAU)) * V::constant(1.0 / SINES))
+}
+
+/// `x` within 0 to 1.
+#[inline(always)]
+fn unit<V: Lanes>(x: V) -> V {
+    x.fast_max(V::constant(0.0)).fast_min(V::constant(1.0))
 }
 
 /// Sky with clouds.
-fn cloud(u: f64, v: f64) -> DVec3 {
-    const SKY: DVec3 = DVec3::new(0.31, 0.31, 0.78);
+#[inline(always)]
+fn cloud<V: Lanes>(u: V, v: V) -> Lanes3<V> {
+    const SKY: [f64; 3] = [0.31, 0.31, 0.78];
     const THRESHOLD: f64 = 0.35;
     const RANGE: f64 = 0.3;
-    let t = texture(u, v).clamp(0.0, 1.0);
-    let clear = (1.0 - (t - THRESHOLD) / RANGE).clamp(0.0, 1.0);
-    DVec3::splat((1.0 - clear) * t) + SKY * clear
+    let one = V::constant(1.0);
+    let t = unit(texture(u, v));
+    let clear = unit(one - (t - V::constant(THRESHOLD)) * V::constant(1.0 / RANGE));
+    let white = (one - clear) * t;
+    each(|k| clear.mul_add(V::constant(SKY[k]), white))
 }
 
 /// Gardner's texture: four octaves of shifted sines.
-fn texture(x: f64, y: f64) -> f64 {
+#[inline(always)]
+fn texture<V: Lanes>(x: V, y: V) -> V {
+    let number = V::constant;
     let (mut fx, mut fy) = (TAU * 2.0, TAU);
-    let mut px = FRAC_PI_2 * sine(0.5 * fy * y);
-    let mut py = FRAC_PI_2 * sine(0.5 * fx * x);
-    let (mut t1, mut t2, mut c) = (0.0, 0.0, 1.0);
+    let mut px = number(FRAC_PI_2) * sine(number(0.5 * fy) * y);
+    let mut py = number(FRAC_PI_2) * sine(number(0.5 * fx) * x);
+    let (mut t1, mut t2, mut c) = (number(0.0), number(0.0), 1.0);
     for _ in 0..4 {
-        t1 += c * sine(fx * x + px) + 1.0;
-        t2 += c * sine(fy * y + py) + 1.0;
-        px = FRAC_PI_2 * sine(fy * y);
-        py = FRAC_PI_2 * sine(fx * x);
+        t1 = t1 + sine(number(fx).mul_add(x, px)).mul_add(number(c), number(1.0));
+        t2 = t2 + sine(number(fy).mul_add(y, py)).mul_add(number(c), number(1.0));
+        px = number(FRAC_PI_2) * sine(number(fy) * y);
+        py = number(FRAC_PI_2) * sine(number(fx) * x);
         fx *= 2.0;
         fy *= 2.0;
         c *= 0.707;
     }
-    t1 * t2 / 32.0
-}
-
-/// Parameters of a direction on the sphere around everything.
-pub(super) fn uv_of_direction(d: DVec3) -> [f64; 2] {
-    let u = d.y.atan2(d.x) / TAU;
-    [if u < 0.0 { u + 1.0 } else { u }, d.z.atan2(d.x.hypot(d.y)) / PI + 0.5]
-}
-
-/// Parameters of the surface of leaf `prim` in region `region` at `position` with outward `normal`; `None` for solids
-/// without.
-pub(super) fn uv<S: Real>(
-    world: &World<S>,
-    region: u32,
-    prim: u32,
-    position: DVec3,
-    normal: DVec3,
-) -> Option<[f64; 2]> {
-    let part = &world.assembly.objects[0].parts[region as usize];
-    let PartKind::Solids(tree) = &part.kind else { return None };
-    match tree.leaves[(prim - part.first_prim) as usize].solid {
-        Solid::Shape(Shape::Sphere) => Some(uv_of_direction(world.local(0, prim, position))),
-        Solid::Shape(Shape::HalfSpace) => Some(uv_of_plane(position, normal)),
-        _ => None,
-    }
-}
-
-/// Parameters of a plane: distances along two axes, there and back again every ten metres.
-fn uv_of_plane(position: DVec3, n: DVec3) -> [f64; 2] {
-    let from_foot = position - n * n.dot(position);
-    let a = n.abs();
-    let axis = if a.x <= a.y && a.x <= a.z {
-        DVec3::X
-    } else if a.y <= a.z {
-        DVec3::Y
-    } else {
-        DVec3::Z
-    };
-    let x = axis.cross(n).normalize();
-    let y = x.cross(n).normalize();
-    [x, y].map(|axis| {
-        let f = (from_foot.dot(axis).abs() / HALF_SPACE_PERIOD).fract();
-        if f < 0.5 { 2.0 * f } else { 2.0 * (1.0 - f) }
-    })
-}
-
-/// Parameters of that of an arb's `faces` that `normal` belongs to, at `position`: they run from 0 to 1 over the smallest
-/// rectangle along the face's first edge.
-pub(super) fn uv_of_arb(faces: &[Face], position: DVec3, normal: DVec3) -> Option<[f64; 2]> {
-    let along = |face: &&Face| face.normal.dot(normal).abs() > 0.999;
-    let distance = |face: &Face| (position - face.origin).dot(face.normal).abs();
-    let best = faces.iter().filter(along).min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-    let from = position - best.origin;
-    Some([from.dot(best.u) / best.u_length, from.dot(best.v) / best.v_length])
-}
-
-/// A face of an arb with its axes.
-#[derive(Clone, Debug)]
-pub(super) struct Face {
-    origin: DVec3,
-    normal: DVec3,
-    u: DVec3,
-    v: DVec3,
-    u_length: f64,
-    v_length: f64,
-}
-
-impl Face {
-    /// The faces of the arb with corners `points`.
-    pub fn of_arb(points: &[DVec3; 8]) -> Vec<Self> {
-        ARB_FACES.iter().filter_map(|face| Self::of(&face.map(|i| points[i]))).collect()
-    }
-
-    fn of(corners: &[DVec3; 4]) -> Option<Self> {
-        let mut distinct: Vec<DVec3> = Vec::new();
-        for &p in corners {
-            if distinct.iter().all(|q| q.distance(p) > SAME_POINT) {
-                distinct.push(p);
-            }
-        }
-        let &[a, b, c, ..] = distinct.as_slice() else { return None };
-        let normal = (c - a).cross(b - a).try_normalize()?;
-        let u = (b - a).normalize();
-        let v = normal.cross(u).normalize();
-        let range = |axis: DVec3| {
-            let along = distinct.iter().map(|&p| (p - a).dot(axis));
-            along.fold((0.0f64, 0.0f64), |(low, high), x| (low.min(x), high.max(x)))
-        };
-        let ((u_low, u_high), (v_low, v_high)) = (range(u), range(v));
-        let origin = a + u * u_low + v * v_low;
-        Some(Self { origin, normal, u, v, u_length: u_high - u_low, v_length: v_high - v_low })
-    }
+    t1 * t2 * number(1.0 / 32.0)
 }
 
 #[cfg(test)]
@@ -201,41 +114,50 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_is_a_sine_to_half_a_step() {
+    fn sines_are_those_of_the_nearest_step() {
         for i in -5000..5000 {
             let angle = f64::from(i) * 0.0123;
-            assert!((sine(angle) - angle.sin()).abs() < 0.5 * TAU / SINES as f64 + 1e-6, "{angle}");
+            let nearest = ((angle * SINES / TAU).round() * TAU / SINES).sin();
+            assert!((sine(angle) - nearest).abs() < 1e-12, "{angle}");
         }
     }
 
     #[test]
-    fn faces_of_a_box_have_parameters_from_corner_to_corner() {
-        let points = [
-            [0.0, 0.0, 0.0],
-            [2.0, 0.0, 0.0],
-            [2.0, 3.0, 0.0],
-            [0.0, 3.0, 0.0],
-            [0.0, 0.0, 4.0],
-            [2.0, 0.0, 4.0],
-            [2.0, 3.0, 4.0],
-            [0.0, 3.0, 4.0],
-        ]
-        .map(DVec3::from);
-        let faces = Face::of_arb(&points);
-        let middle = uv_of_arb(&faces, DVec3::new(1.0, 1.5, 4.0), DVec3::Z).unwrap();
-        assert!((middle[0] - 0.5).abs() < 1e-12 && (middle[1] - 0.5).abs() < 1e-12);
-        let mut corners: Vec<[i64; 2]> =
-            points[4..].iter().map(|&p| uv_of_arb(&faces, p, DVec3::Z).unwrap().map(|x| x.round() as i64)).collect();
-        corners.sort_unstable();
-        assert_eq!(corners, [[0, 0], [0, 1], [1, 0], [1, 1]]);
+    fn checkers_alternate() {
+        let (a, b) = (DVec3::X, DVec3::Y);
+        let checker = Pattern::Checker { a, b, scale: 3.0 };
+        for i in 0..9 {
+            for j in 0..9 {
+                let at = [i, j].map(|k| (f64::from(k) + 0.4) / 9.0);
+                let expected = if (i / 3 + j / 3) % 2 == 0 { a } else { b };
+                assert_eq!(checker.color(at), expected.to_array(), "{at:?}");
+                assert_eq!(checker.color(at.map(|x| x as f32)).map(f64::from), expected.to_array());
+            }
+        }
     }
 
     #[test]
-    fn planes_repeat_there_and_back() {
-        let at = |x: f64| uv_of_plane(DVec3::new(x, 0.0, 7.0), DVec3::Z);
-        let along = at(2500.0);
-        assert!(along.contains(&0.5) && along.contains(&0.0), "{along:?}");
-        assert_eq!(at(7500.0), along);
-        assert_eq!(at(12_500.0), along);
+    fn clouds_are_between_sky_and_white() {
+        // By the definition, with plain sines: steps are a 2048th of a turn.
+        let plain = |x: f64, y: f64| {
+            let (mut fx, mut fy) = (TAU * 2.0, TAU);
+            let (mut px, mut py) = (FRAC_PI_2 * (0.5 * fy * y).sin(), FRAC_PI_2 * (0.5 * fx * x).sin());
+            let (mut t1, mut t2, mut c) = (0.0, 0.0, 1.0);
+            for _ in 0..4 {
+                t1 += c * (fx * x + px).sin() + 1.0;
+                t2 += c * (fy * y + py).sin() + 1.0;
+                (px, py) = (FRAC_PI_2 * (fy * y).sin(), FRAC_PI_2 * (fx * x).sin());
+                (fx, fy, c) = (fx * 2.0, fy * 2.0, c * 0.707);
+            }
+            t1 * t2 / 32.0
+        };
+        for i in 0..40 {
+            for j in 0..40 {
+                let (u, v) = (f64::from(i) / 40.0, f64::from(j) / 40.0);
+                assert!((texture(u, v) - plain(u, v)).abs() < 0.02);
+                let color = Pattern::Cloud.color([u, v]);
+                assert!(color[0] == color[1] && color.iter().all(|x| (0.0..=1.0).contains(x)) && color[2] >= color[0]);
+            }
+        }
     }
 }

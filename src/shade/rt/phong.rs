@@ -4,79 +4,15 @@ use glam::DVec3;
 
 use super::glass::{self, refract};
 use super::lamp::Lamp;
-use super::level::{Found, Level};
+use super::level::{Found, Level, vector};
 use super::material::Finish;
+use super::meetings::{Kinds, Meetings};
 use super::shadow::Probes;
 use super::{AIR, AMBIENT, MAX_BOUNCES, Memory, Path, Rt, TOLERANCE, Within};
-use crate::lanes::chosen::{at, lanes_of, packets, spill};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, space};
+use crate::lanes::chosen::lanes_of;
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, space};
 use crate::shade::sample::Samples;
 use crate::shade::shader::{Shader, Workspace};
-
-/// What the paths of a level show where they enter regions, parallel to its rays.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Meetings<S> {
-    /// Of each vector of lanes: those that enter a region.
-    pub lanes: Vec<u32>,
-    /// The regions' colours there.
-    pub base: [Vec<S>; 3],
-    /// What they show.
-    color: [Vec<S>; 3],
-    /// How much of a light arrives.
-    visible: Vec<S>,
-}
-
-impl<S: Real> Meetings<S> {
-    /// None yet, of a level of `padded` rays with its padding.
-    pub fn open(&mut self, padded: usize) {
-        self.lanes.clear();
-        self.lanes.resize(padded / S::Wide::N, 0);
-        for array in self.base.iter_mut().chain(&mut self.color).chain([&mut self.visible]) {
-            array.resize(padded, S::ZERO);
-        }
-    }
-
-    /// Ray `i` enters a region of colour `base`.
-    #[inline]
-    pub fn add(&mut self, i: usize, base: DVec3) {
-        self.lanes[i / S::Wide::N] |= 1 << (i % S::Wide::N);
-        (0..3).for_each(|axis| self.base[axis][i] = S::from_f64(base[axis]));
-    }
-}
-
-#[inline(always)]
-fn vector<S: Real>(from: &[Vec<S>; 3], first: usize) -> Lanes3<S::Wide> {
-    [S::Wide::load(&from[0][first..]), S::Wide::load(&from[1][first..]), S::Wide::load(&from[2][first..])]
-}
-
-/// Finishes of the regions of `lanes`; of other lanes and unlit regions zeros.
-struct Finishes<V> {
-    shine: V,
-    specular: V,
-    diffuse: V,
-    /// Whether light from behind counts.
-    transmits: u32,
-    /// Lanes with a finish.
-    lanes: u32,
-}
-
-impl<V: Lanes> Finishes<V> {
-    #[inline(always)]
-    fn of(rt: &Rt, region: &[u32], lanes: u32) -> Self {
-        let mut columns = [[V::Scalar::ZERO; MAX_LANES]; 3];
-        let (mut transmits, mut with) = (0, 0);
-        for lane in lanes_of(lanes) {
-            let Some(finish) = &rt.materials[region[lane] as usize].finish else { continue };
-            with |= 1 << lane;
-            transmits |= u32::from(finish.transmit > 0.0) << lane;
-            for (column, x) in columns.iter_mut().zip([finish.shine, finish.specular, finish.diffuse]) {
-                column[lane] = V::Scalar::from_f64(x);
-            }
-        }
-        let [shine, specular, diffuse] = columns.map(|column| V::load(&column));
-        Self { shine, specular, diffuse, transmits, lanes: with }
-    }
-}
 
 impl<S: Real> Shader<'_, S> {
     /// Lights the meetings of a level, adds what they show to the pixels and puts mirror and glass rays into `next`.
@@ -94,25 +30,23 @@ impl<S: Real> Shader<'_, S> {
             if lamp.region.is_none() {
                 meetings.visible.fill(S::ONE);
             } else {
-                aim(rt, lamp, found, meetings, probes);
+                aim(lamp, found, meetings, probes);
                 meetings.visible.fill(S::ZERO);
                 self.rt_visible(rt, probes, next_probes, shadow, &mut meetings.visible, work);
             }
-            light(rt, lamp, level, found, meetings);
+            light(lamp, level, found, meetings);
         }
-        for (first, lanes) in packets::<S::Wide>(&meetings.lanes) {
-            for lane in lanes_of(lanes) {
-                let i = first + lane;
-                let color = DVec3::from(each(|axis| meetings.color[axis][i].to_f64()));
-                let shown = match &rt.materials[found.region[i] as usize].finish {
-                    Some(finish) if finish.reflect > 0.0 || finish.transmit > 0.0 => {
-                        let base = DVec3::from(each(|axis| meetings.base[axis][i].to_f64()));
-                        send_on(level.path(i), found, i, finish, base, color, next)
-                    }
-                    _ => color,
-                };
-                let carry = level.carry(i);
-                out.colors[carry.pixel as usize].radiance += carry.throughput * shown;
+        for k in 0..meetings.kinds.len() {
+            let (first, kinds) = (k * S::Wide::N, meetings.kinds[k]);
+            for i in lanes_of(kinds.sends).map(|lane| first + lane) {
+                let Some(finish) = &rt.materials[found.region[i] as usize].finish else { continue };
+                let of = |list: &[Vec<S>; 3]| DVec3::from(each(|axis| list[axis][i].to_f64()));
+                let (base, color) = (of(&meetings.base), of(&meetings.color));
+                let shown = send_on(level.path(i), found, i, finish, base, color, next);
+                (0..3).for_each(|axis| meetings.color[axis][i] = S::from_f64(shown[axis]));
+            }
+            if kinds.entering != 0 {
+                level.show(first, kinds.entering, vector(&meetings.color, first), out);
             }
         }
     }
@@ -120,22 +54,19 @@ impl<S: Real> Shader<'_, S> {
 
 /// What surfaces show without lights: ambient light, their own light, or a pattern as it is.
 fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
-    let Meetings { lanes, base, color, .. } = meetings;
-    for (first, lanes) in packets::<S::Wide>(lanes) {
+    let Meetings { kinds, base, color, .. } = meetings;
+    for (k, kinds) in kinds.iter().enumerate().filter(|(_, kinds)| kinds.entering != 0) {
+        let first = k * S::Wide::N;
         let (normal, dir) = (vector(&found.normal, first), vector(&level.rays.dir, first));
         let zero = S::Wide::constant(0.0);
         let facing = zero - dot(normal, dir);
         let ambient = zero.fast_max(facing) * S::Wide::constant(AMBIENT);
-        for axis in 0..3 {
-            (S::Wide::load(&base[axis][first..]) * ambient).store(&mut color[axis][first..]);
-        }
-        for lane in lanes_of(lanes) {
+        let shown = space::scale(vector(base, first), ambient);
+        (0..3).for_each(|axis| shown[axis].store(&mut color[axis][first..]));
+        for lane in lanes_of(kinds.plain) {
             let (i, region) = (first + lane, found.region[first + lane]);
-            let material = &rt.materials[region as usize];
-            if !material.is_light && material.finish.is_some() {
-                continue;
-            }
-            let lamp = rt.lamps.iter().find(|lamp| material.is_light && lamp.region == Some(region));
+            let is_light = rt.materials[region as usize].is_light;
+            let lamp = rt.lamps.iter().find(|lamp| is_light && lamp.region == Some(region));
             let seen = lamp.map(|lamp| lamp.seen(facing.lane(lane).to_f64(), found.normal(i)));
             for axis in 0..3 {
                 color[axis][i] = seen.map_or(base[axis][i], |seen| S::from_f64(seen[axis]));
@@ -146,50 +77,45 @@ fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Me
 
 /// Unit directions to the light, and the lanes that it may light.
 #[inline(always)]
-fn towards<S: Real>(
-    lamp: &Lamp,
-    found: &Found<S>,
-    finishes: &Finishes<S::Wide>,
-    first: usize,
-) -> (Lanes3<S::Wide>, u32) {
+fn towards<S: Real>(lamp: &Lamp, found: &Found<S>, kinds: Kinds, first: usize) -> (Lanes3<S::Wide>, u32) {
     let splat = |v: DVec3| v.to_array().map(S::Wide::constant);
     let to_light = space::normalize(space::sub(splat(lamp.position), vector(&found.position, first)));
     let in_front = S::Wide::constant(0.0).cmp_le(dot(vector(&found.normal, first), to_light)).bits();
     let in_cone = S::Wide::constant(lamp.cosine).cmp_le(S::Wide::constant(0.0) - dot(to_light, splat(lamp.aim))).bits();
-    (to_light, (in_front | finishes.transmits) & in_cone & finishes.lanes)
+    (to_light, (in_front | kinds.transmits) & in_cone & kinds.lit)
 }
 
 /// Shadow rays from the meetings to `lamp`.
-fn aim<S: Real>(rt: &Rt, lamp: &Lamp, found: &Found<S>, meetings: &Meetings<S>, probes: &mut Probes<S>) {
+fn aim<S: Real>(lamp: &Lamp, found: &Found<S>, meetings: &Meetings<S>, probes: &mut Probes<S>) {
     probes.open(found.t.len());
-    for (first, lanes) in packets::<S::Wide>(&meetings.lanes) {
-        let finishes = Finishes::of(rt, &found.region[first..], lanes);
-        let (to_light, lit) = towards(lamp, found, &finishes, first);
+    for (first, kinds) in meetings.packets() {
+        let (to_light, lit) = towards(lamp, found, kinds, first);
         let position = vector(&found.position, first);
-        let org = spill(each(|axis| to_light[axis].mul_add(S::Wide::constant(TOLERANCE), position[axis])));
-        let dir = spill(to_light);
-        lanes_of(lit).for_each(|lane| probes.push((first + lane) as u32, at(&org, lane), at(&dir, lane)));
+        let org = each(|axis| to_light[axis].mul_add(S::Wide::constant(TOLERANCE), position[axis]));
+        probes.push(first, lit, org, to_light);
     }
+    probes.close();
 }
 
 /// Adds the light of `lamp`: diffuse, and the highlight.
 ///
 /// Source of the highlight: Christophe Schlick, "A Fast Alternative to Phong's Specular Model", Graphics Gems IV, 1994.
-fn light<S: Real>(rt: &Rt, lamp: &Lamp, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
+fn light<S: Real>(lamp: &Lamp, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
     let zero = S::Wide::constant(0.0);
-    let Meetings { lanes, base, color, visible } = meetings;
-    for (first, lanes) in packets::<S::Wide>(lanes) {
+    let Meetings { kinds, base, finish, color, visible } = meetings;
+    for (k, &kinds) in kinds.iter().enumerate().filter(|(_, kinds)| kinds.lit != 0) {
+        let first = k * S::Wide::N;
         let visible = S::Wide::load(&visible[first..]);
-        let lanes = lanes & zero.cmp_lt(visible).bits();
-        if lanes == 0 {
+        let seen = zero.cmp_lt(visible).bits();
+        if kinds.lit & seen == 0 {
             continue;
         }
-        let finishes = Finishes::of(rt, &found.region[first..], lanes);
-        let (to_light, lit) = towards(lamp, found, &finishes, first);
+        let (to_light, lit) = towards(lamp, found, kinds, first);
+        let lit = lit & seen;
         let lit = <S::Wide as Lanes>::Mask::from_bits(lit);
         let (normal, dir) = (vector(&found.normal, first), vector(&level.rays.dir, first));
         let cosine = dot(normal, to_light);
-        let Finishes { shine, specular, diffuse, .. } = finishes;
+        let [shine, specular, diffuse] = vector(finish, first);
         let diffuse = zero.fast_max(diffuse * cosine);
         let mirrored = space::sub(space::scale(normal, cosine + cosine), to_light);
         let s = zero - dot(mirrored, dir);

@@ -1,8 +1,11 @@
 //! Whether lights are seen from surfaces: one ray to the middle of each, through whatever lets light pass.
 
 use super::level::{Found, start};
+use super::meetings::words;
 use super::{Rt, TOLERANCE};
-use crate::lanes::Real;
+use crate::lanes::chosen::{Chosen, lanes_of};
+use crate::lanes::words::positions;
+use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
 use crate::ray::Rays;
 use crate::shade::shader::{Shader, Workspace};
 
@@ -37,22 +40,31 @@ pub(super) struct Probes<S> {
 }
 
 impl<S: Real> Probes<S> {
-    /// None, with room for `count`.
+    /// None, with room for `count`; [`Self::close`] ends the additions.
     pub fn open(&mut self, count: usize) {
-        self.rays.reset(count);
+        self.rays.open(count);
         self.carry.clear();
     }
 
-    /// Adds one from hit `slot`, towards the light at the unit direction `dir`; `org` is the tolerance away from the hit.
+    /// Adds those of `lanes` from hits `first + lane`, towards the light at the unit directions `dir`; `org` is the tolerance
+    /// away from the hits.
     #[inline]
-    pub fn push(&mut self, slot: u32, org: [S; 3], dir: [S; 3]) {
-        let from = start(org) - S::from_f64(TOLERANCE);
-        self.add(Probe { slot, filter: 1.0, within: None }, org, dir, from);
+    pub fn push(&mut self, first: usize, lanes: u32, org: Lanes3<S::Wide>, dir: Lanes3<S::Wide>) {
+        let (chosen, at) = (Chosen::of(lanes), self.carry.len());
+        let from = start(org) - S::Wide::constant(TOLERANCE);
+        self.rays.put(at, &chosen, [org, dir], S::Wide::splat(S::INFINITY));
+        chosen.pack(from, &mut self.rays.t_min[at..]);
+        self.carry.extend(chosen.iter().map(|lane| Probe { slot: (first + lane) as u32, filter: 1.0, within: None }));
     }
 
     fn add(&mut self, probe: Probe, org: [S; 3], dir: [S; 3], from: S) {
         self.rays.set(self.carry.len(), org, dir, from, S::INFINITY);
         self.carry.push(probe);
+    }
+
+    /// Ends the additions.
+    pub fn close(&mut self) {
+        self.rays.close(self.carry.len());
     }
 }
 
@@ -71,30 +83,61 @@ impl<S: Real> Shader<'_, S> {
         let tolerance = S::from_f64(TOLERANCE);
         while !probes.carry.is_empty() {
             let count = probes.carry.len();
-            probes.rays.truncate(count);
             work.rays.shadow += count as u64;
             self.intersect_all(&probes.rays, work);
             found.set(self.world, &probes.rays, &work.hits);
             next.open(count);
-            for (i, probe) in probes.carry.iter().enumerate() {
-                match judge(rt, probe, i, found) {
-                    Verdict::Arrives => visible[probe.slot as usize] = S::from_f64(probe.filter),
-                    Verdict::Dark => {}
-                    Verdict::GoesOn(on) => {
-                        next.add(on, probes.rays.org(i), probes.rays.dir(i), found.t[i] + tolerance);
+            for (k, &hit) in found.hit.iter().enumerate() {
+                // A light is a thing: a ray that meets nothing has missed it.
+                let first = k * S::Wide::N;
+                let simple = simple_verdicts(rt, first, hit & !found.leaving[k], probes, found, visible);
+                for i in lanes_of(hit & !simple).map(|lane| first + lane) {
+                    let probe = &probes.carry[i];
+                    match judge(rt, probe, i, found) {
+                        Verdict::Arrives => visible[probe.slot as usize] = S::from_f64(probe.filter),
+                        Verdict::Dark => {}
+                        Verdict::GoesOn(on) => {
+                            next.add(on, probes.rays.org(i), probes.rays.dir(i), found.t[i] + tolerance);
+                        }
                     }
                 }
             }
+            next.close();
             std::mem::swap(probes, next);
         }
     }
 }
 
-fn judge<S: Real>(rt: &Rt, probe: &Probe, i: usize, found: &Found<S>) -> Verdict {
-    // A light is a thing: a ray that meets nothing has missed it.
-    if !found.is_hit(i) {
-        return Verdict::Dark;
+/// Of `lanes`, which enter regions, those that enter lights or what nothing passes through: the former arrive.
+#[inline]
+fn simple_verdicts<S: Real>(
+    rt: &Rt,
+    first: usize,
+    lanes: u32,
+    probes: &Probes<S>,
+    found: &Found<S>,
+    visible: &mut [S],
+) -> u32 {
+    let (mut rest, mut simple) = (lanes, 0);
+    let regions = words::<S>(&found.region, first);
+    while rest != 0 {
+        let region = regions[rest.trailing_zeros() as usize % MAX_LANES];
+        let same = positions(&regions, region) & rest;
+        rest &= !same;
+        let material = &rt.materials[region as usize];
+        if material.is_light {
+            for probe in lanes_of(same).map(|lane| &probes.carry[first + lane]) {
+                visible[probe.slot as usize] = S::from_f64(probe.filter);
+            }
+        }
+        if material.is_light || material.finish.is_none_or(|finish| finish.transmit <= 0.0) {
+            simple |= same;
+        }
     }
+    simple
+}
+
+fn judge<S: Real>(rt: &Rt, probe: &Probe, i: usize, found: &Found<S>) -> Verdict {
     let (t, region, leaving) = (found.t[i].to_f64(), found.region[i], found.is_leaving(i));
     if leaving && (probe.within == Some(region) || t < THIN_AT_START) {
         return Verdict::GoesOn(Probe { within: None, ..*probe });

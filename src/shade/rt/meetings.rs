@@ -1,0 +1,131 @@
+//! Where paths enter regions: what the regions look like there, in lanes.
+
+use super::Rt;
+use super::level::{Found, vector};
+use super::material::RtMaterial;
+use super::parameters::{uv, uv_of_arb};
+use super::pattern::Pattern;
+use crate::lanes::words::positions;
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, space};
+use crate::scene::world::World;
+
+/// What the paths of a level show where they enter regions, parallel to its rays.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Meetings<S> {
+    /// Of each vector of lanes.
+    pub kinds: Vec<Kinds>,
+    /// The regions' colours there.
+    pub base: [Vec<S>; 3],
+    /// Shine, specular and diffuse of the regions' finishes, zeros without.
+    pub finish: [Vec<S>; 3],
+    /// What they show.
+    pub color: [Vec<S>; 3],
+    /// How much of a light arrives.
+    pub visible: Vec<S>,
+}
+
+/// Lanes of a vector by what they have entered.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Kinds {
+    /// A region.
+    pub entering: u32,
+    /// One with a finish.
+    pub lit: u32,
+    /// One that light from behind counts for.
+    pub transmits: u32,
+    /// One that sends mirrored or refracted rays on.
+    pub sends: u32,
+    /// One that shows its own light, or its colour as it is.
+    pub plain: u32,
+}
+
+impl<S: Real> Meetings<S> {
+    /// None yet, of a level of `padded` rays with its padding.
+    pub fn open(&mut self, padded: usize) {
+        self.kinds.clear();
+        let lists = [&mut self.base, &mut self.finish, &mut self.color];
+        for array in lists.into_iter().flatten().chain([&mut self.visible]) {
+            array.resize(padded, S::ZERO);
+        }
+    }
+
+    /// The next vector of lanes, whose rays are those from `first` on: rays `entering` enter the regions of `found`, at the
+    /// leaves `prims`.
+    #[inline]
+    pub fn add(&mut self, rt: &Rt, world: &World<S>, found: &Found<S>, prims: &[u32], first: usize, entering: u32) {
+        let mut kinds = Kinds { entering, ..Kinds::default() };
+        let zero = [S::Wide::constant(0.0); 3];
+        let (mut base, mut finishes) = (zero, zero);
+        let regions = words::<S>(&found.region, first);
+        let mut rest = entering;
+        while rest != 0 {
+            let region = regions[rest.trailing_zeros() as usize % MAX_LANES];
+            let same = positions(&regions, region) & rest;
+            rest &= !same;
+            let mask = <S::Wide as Lanes>::Mask::from_bits(same);
+            let material = &rt.materials[region as usize];
+            let color = match &material.pattern {
+                None => each(|axis| S::Wide::constant(material.base[axis])),
+                Some(pattern) => patterned(pattern, material, world, found, prims, first, same),
+            };
+            base = space::choose(mask, color, base);
+            if material.is_light || material.finish.is_none() {
+                kinds.plain |= same;
+            }
+            let Some(finish) = &material.finish else { continue };
+            finishes =
+                space::choose(mask, [finish.shine, finish.specular, finish.diffuse].map(Lanes::constant), finishes);
+            let (transmits, reflects) = (finish.transmit > 0.0, finish.reflect > 0.0);
+            kinds.lit |= same;
+            kinds.transmits |= if transmits { same } else { 0 };
+            kinds.sends |= if transmits || reflects { same } else { 0 };
+        }
+        if entering != 0 {
+            for axis in 0..3 {
+                base[axis].store(&mut self.base[axis][first..]);
+                finishes[axis].store(&mut self.finish[axis][first..]);
+            }
+        }
+        self.kinds.push(kinds);
+    }
+
+    /// Vectors with lanes that enter a region: the number of their first ray, and which.
+    pub fn packets(&self) -> impl Iterator<Item = (usize, Kinds)> {
+        let numbered = self.kinds.iter().enumerate().filter(|(_, kinds)| kinds.entering != 0);
+        numbered.map(|(k, &kinds)| (k * S::Wide::N, kinds))
+    }
+}
+
+/// The words of a vector of lanes from `first` on.
+#[inline(always)]
+pub(super) fn words<S: Real>(list: &[u32], first: usize) -> [u32; MAX_LANES] {
+    let mut words = [0; MAX_LANES];
+    words[..S::Wide::N].copy_from_slice(&list[first..first + S::Wide::N]);
+    words
+}
+
+/// Colours of `pattern` on those of `lanes`, all in the region of `material`.
+#[inline(never)]
+fn patterned<S: Real>(
+    pattern: &Pattern,
+    material: &RtMaterial,
+    world: &World<S>,
+    found: &Found<S>,
+    prims: &[u32],
+    first: usize,
+    lanes: u32,
+) -> Lanes3<S::Wide> {
+    let prims = words::<S>(prims, first);
+    let (position, normal) = (vector(&found.position, first), vector(&found.normal, first));
+    let mut colors = [S::Wide::constant(0.0); 3];
+    let mut rest = lanes;
+    while rest != 0 {
+        let lead = rest.trailing_zeros() as usize % MAX_LANES;
+        let same = positions(&prims, prims[lead]) & rest;
+        rest &= !same;
+        let at = uv(world, found.region[first + lead], prims[lead], position, normal)
+            .unwrap_or_else(|| uv_of_arb(material.faces(), position, normal));
+        colors = space::choose(<S::Wide as Lanes>::Mask::from_bits(same), pattern.color(at), colors);
+    }
+    colors
+}

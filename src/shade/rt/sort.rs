@@ -1,0 +1,106 @@
+//! Tells the hits of a level apart: what goes on as it is, what is lit, what leaves the scene.
+
+use glam::DVec3;
+
+use super::level::{Found, Level, vector};
+use super::parameters::uv_of_direction;
+use super::pattern::Pattern;
+use super::{BACKGROUND, Carry, INSIDE, MAX_BOUNCES, Memory, Path, Rt, THIN, glass};
+use crate::lanes::chosen::{lanes_of, packets};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each, map3};
+use crate::ray::Hits;
+use crate::shade::sample::Samples;
+use crate::shade::shader::{Shader, Workspace};
+
+impl<S: Real> Shader<'_, S> {
+    /// Paths of the level that meet nothing become its lost ones, those that go on as they are go to `next`, those that
+    /// enter regions to the meetings.
+    pub(super) fn rt_sort(
+        &self,
+        rt: &Rt,
+        memory: &mut Memory<S>,
+        hits: &Hits<S>,
+        next: &mut Vec<Path>,
+        out: &mut Samples,
+    ) {
+        let Memory { level, found, meetings, lost, .. } = memory;
+        let padded = level.rays.padded_len();
+        meetings.open(padded);
+        lost.clear();
+        for (k, first) in (0..padded).step_by(S::Wide::N).enumerate() {
+            let [live, within] = level.lanes(k);
+            lanes_of(within).for_each(|lane| glass::step(level, first + lane, found, next));
+            let (free, hit, leaving) = (live & !within, found.hit[k], found.leaving[k]);
+            lost.push(free & !hit);
+            lanes_of(free & leaving).for_each(|lane| leave(level, first + lane, found, next, out));
+            meetings.add(rt, self.world, found, &hits.prim, first, free & hit & !leaving);
+        }
+    }
+
+    /// Rays that nothing stops: the surroundings, or the inside of a solid without end.
+    pub(super) fn rt_lost(&self, rt: &Rt, memory: &mut Memory<S>, work: &mut Workspace<S>, out: &mut Samples) {
+        let Memory { level, lost, inside, back, shadow, .. } = memory;
+        inside.clear();
+        inside.resize(lost.len(), 0);
+        if rt.unbounded.contains(&true) && lost.iter().any(|&lanes| lanes != 0) {
+            // A ray that starts inside a region without bounds leaves it when it looks back.
+            let turned = |path: Path| Path { dir: -path.dir, ..path };
+            let all =
+                || packets::<S::Wide>(lost).flat_map(|(first, lanes)| lanes_of(lanes).map(move |lane| first + lane));
+            back.open(&all().map(|i| turned(level.path(i))).collect::<Vec<_>>());
+            self.intersect_all(&back.rays, work);
+            shadow.set(self.world, &back.rays, &work.hits);
+            for (k, i) in all().enumerate() {
+                let is_inside = shadow.is_leaving(k) && rt.unbounded[shadow.region[k] as usize];
+                inside[i / S::Wide::N] |= u32::from(is_inside) << (i % S::Wide::N);
+            }
+        }
+        let mut sky = Sky { pattern: rt.surroundings.as_ref(), last: Default::default() };
+        for (first, lanes) in packets::<S::Wide>(lost) {
+            let within = inside[first / S::Wide::N];
+            let color = sky.color::<S>(vector(&level.rays.dir, first), lanes);
+            level.show(first, lanes & !within, color, out);
+            level.show(first, within, [S::Wide::constant(INSIDE.0); 3], out);
+        }
+    }
+}
+
+/// Path `i` of `level` meets a region from inside: it goes on if it has only just left glass, or shows the inside.
+#[cold]
+fn leave<S: Real>(level: &Level<S>, i: usize, found: &Found<S>, next: &mut Vec<Path>, out: &mut Samples) {
+    let path = level.path(i);
+    let carry = path.carry;
+    if carry.left == Some(found.region[i]) && found.t[i].to_f64() < THIN {
+        next.push(Path { org: found.position(i), carry: Carry { left: None, ..carry }, ..path });
+    } else {
+        let color = INSIDE.0 * INSIDE.1.powi((MAX_BOUNCES + 1).saturating_sub(carry.level) as i32);
+        out.colors[carry.pixel as usize].radiance += carry.throughput * color;
+    }
+}
+
+/// What surrounds the scene.
+struct Sky<'a> {
+    pattern: Option<&'a Pattern>,
+    /// Rays of parallel projection all have one direction: the last one's colour.
+    last: (DVec3, DVec3),
+}
+
+impl Sky<'_> {
+    /// What `lanes` of the rays along `dir` see.
+    #[inline]
+    fn color<S: Real>(&mut self, dir: Lanes3<S::Wide>, lanes: u32) -> Lanes3<S::Wide> {
+        let splat = |v: DVec3| each(|axis| S::Wide::constant(v[axis]));
+        let Some(pattern) = self.pattern else { return splat(BACKGROUND) };
+        let lead = lanes.trailing_zeros() as usize;
+        let one = map3(dir, |x| x.lane(lead));
+        let [x, y, z] = each(|axis| dir[axis].cmp_eq(S::Wide::splat(one[axis])));
+        if (x & y & z).bits() & lanes != lanes {
+            return pattern.color(uv_of_direction(dir));
+        }
+        let one = DVec3::from(map3(one, S::to_f64));
+        if one != self.last.0 {
+            self.last = (one, DVec3::from(pattern.color(uv_of_direction(one.to_array()))));
+        }
+        splat(self.last.1)
+    }
+}
