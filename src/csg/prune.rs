@@ -196,6 +196,15 @@ impl Program {
     /// Lanes that are inside, where `inside[i]` has the lanes that are in leaf `i`.
     #[inline(always)]
     pub fn run(&mut self, inside: &[u32]) -> u32 {
+        if let [GateStep { gate, start, .. }] = self.gates[..] {
+            // Most solids, or what is left of them, are one operation.
+            let values = self.leaves.iter().zip(inside).map(|(leaf, &inside)| inside ^ leaf.negated);
+            return match gate {
+                Gate::And => values.fold(start, |all, value| all & value),
+                Gate::Or => values.fold(start, |all, value| all | value),
+                Gate::Xor => values.fold(start, |all, value| all ^ value),
+            };
+        }
         for (value, gate) in self.values.iter_mut().zip(&self.gates) {
             *value = gate.start;
         }

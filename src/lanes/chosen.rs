@@ -21,6 +21,14 @@ pub fn packets<V: Lanes>(lanes: &[u32]) -> impl Iterator<Item = (usize, u32)> {
     numbered.map(|(k, &bits)| (k * V::N, bits))
 }
 
+/// The first `n` words of `list`, and zeros.
+#[inline(always)]
+pub fn vector_of(list: &[u32], n: usize) -> [u32; MAX_LANES] {
+    let mut words = [0; MAX_LANES];
+    words[..n].copy_from_slice(&list[..n]);
+    words
+}
+
 /// A list with `new` where the mask is set. Numbers are moved as floats: selection copies bits.
 #[inline(always)]
 pub fn merge(mask: <f32x16 as Lanes>::Mask, new: u32, old: [u32; MAX_LANES]) -> [u32; MAX_LANES] {

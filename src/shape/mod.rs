@@ -36,7 +36,7 @@ pub use placed::{Placed, PlacedRecord};
 pub use planes::planes_span;
 pub use span::{Solid, Span};
 pub use sphere::{Sphere, SphereRecord, WorldSphere};
-pub use taper::{taper, taper_normal};
+pub use taper::{taper, taper_normal, taper_side_normal};
 pub use torus::{torus, torus_normal};
 pub use triangle::{Degenerate, Triangle, TriangleBlock, Turned, around};
 

@@ -15,16 +15,26 @@ pub type Quartic<V> = [V; 5];
 /// interval count as positive whatever rounding says.
 #[inline(always)]
 pub fn spans<V: Lanes>(p: &Quartic<V>, ends_outside: bool, mut emit: impl FnMut(V::Mask, V, V)) {
+    let lanes = !is_positive(p) & V::Mask::from_bits(V::ALL);
+    if !lanes.any() {
+        return;
+    }
     let (low, high) = (V::constant(-1.0), V::constant(1.0));
     let slope = [p[1], twice(p[2]), V::constant(3.0) * p[3], twice(twice(p[4]))];
     let [e1, e2] = bends(p);
     // Extrema only need to be known to the root of the precision: the quartic is flat there.
-    let coarse = V::splat(V::Scalar::EPSILON).sqrt();
-    let fine = V::constant(4.0 * V::Scalar::EPSILON.to_f64());
-    let turn = |from: V, to: V| monotone_root(&slope, from, to, coarse);
-    let points = [low, turn(low, e1), turn(e1, e2), turn(e2, high), high];
+    let epsilon = V::Scalar::EPSILON.to_f64();
+    let (coarse, fine) = (epsilon.sqrt(), 4.0 * epsilon);
+    let ends = [low, e1, e2, high];
+    let slopes = [value(&slope, low), value(&slope, e1), value(&slope, e2), value(&slope, high)];
+    let turn = |i: usize| {
+        let piece = Piece { ends: [ends[i], ends[i + 1]], values: [slopes[i], slopes[i + 1]], flat: FLAT[i] };
+        monotone_root(&slope, lanes, &piece, coarse)
+    };
+    let points = [low, turn(0), turn(1), turn(2), high];
+    let values = [low, points[1], points[2], points[3], high].map(|s| value(p, s));
     let zero = V::constant(0.0);
-    let mut inside = points.map(|s| value(p, s).cmp_le(zero));
+    let mut inside = values.map(|value| value.cmp_le(zero) & lanes);
     if ends_outside {
         (inside[0], inside[4]) = (V::Mask::from_bits(0), V::Mask::from_bits(0));
     }
@@ -32,7 +42,9 @@ pub fn spans<V: Lanes>(p: &Quartic<V>, ends_outside: bool, mut emit: impl FnMut(
     for i in 0..4 {
         let (enters, leaves) = (!inside[i] & inside[i + 1], inside[i] & !inside[i + 1]);
         if (enters | leaves).any() {
-            let root = monotone_root(p, points[i], points[i + 1], fine);
+            let flat = [i > 0, i < 3];
+            let piece = Piece { ends: [points[i], points[i + 1]], values: [values[i], values[i + 1]], flat };
+            let root = monotone_root(p, enters | leaves, &piece, fine);
             opened = V::select(enters, root, opened);
             if leaves.any() {
                 emit(leaves, opened, root);
@@ -42,6 +54,22 @@ pub fn spans<V: Lanes>(p: &Quartic<V>, ends_outside: bool, mut emit: impl FnMut(
     if inside[4].any() {
         emit(inside[4], opened, high);
     }
+}
+
+/// Which ends of the pieces of a slope are its own extrema.
+const FLAT: [[bool; 2]; 3] = [[false, true], [true, true], [true, false]];
+
+/// Lanes where `p` is positive on all of -1..1, beyond any rounding, as its Bernstein coefficients there tell; not all such
+/// lanes are found.
+#[inline(always)]
+fn is_positive<V: Lanes>(p: &Quartic<V>) -> V::Mask {
+    let (even, odd) = (p[0] + p[4], p[1] + p[3]);
+    let (outer, half) = (even + p[2], V::constant(0.5) * (p[1] - p[3]));
+    let middle = p[2].mul_add(V::constant(-1.0 / 3.0), even);
+    let inner = p[0] - p[4];
+    let least = (outer - odd.abs()).fast_min(inner - half.abs()).fast_min(middle);
+    let size = p[0].abs() + p[1].abs() + p[2].abs() + p[3].abs() + p[4].abs();
+    (size * V::constant(32.0 * V::Scalar::EPSILON.to_f64())).cmp_lt(least)
 }
 
 #[inline(always)]
@@ -59,14 +87,22 @@ fn value<V: Lanes, const N: usize>(p: &[V; N], s: V) -> V {
     sum
 }
 
-/// Value of a polynomial's derivative.
+/// Value, first derivative and half the second one of a polynomial.
 #[inline(always)]
-fn derivative<V: Lanes, const N: usize>(p: &[V; N], s: V) -> V {
-    let mut sum = V::constant((N - 1) as f64) * p[N - 1];
-    for i in (1..N - 1).rev() {
-        sum = sum.mul_add(s, V::constant(i as f64) * p[i]);
+fn expansion<V: Lanes, const N: usize>(p: &[V; N], s: V) -> [V; 3] {
+    let zero = V::constant(0.0);
+    let (mut value, mut first, mut second) = (p[N - 1], zero, zero);
+    for i in (0..N - 1).rev() {
+        // The leading terms, whose factors are zero, are not for the compiler to find.
+        if i + 3 < N {
+            second = second.mul_add(s, first);
+        } else if i + 3 == N {
+            second = first;
+        }
+        first = if i + 2 < N { first.mul_add(s, value) } else { value };
+        value = value.mul_add(s, p[i]);
     }
-    sum
+    [value, first, second]
 }
 
 /// Ascending points of -1..1 between which the second derivative keeps its sign.
@@ -83,33 +119,69 @@ fn bends<V: Lanes>(p: &Quartic<V>) -> [V; 2] {
     [r0.fast_min(r1), r0.fast_max(r1)]
 }
 
-/// The root of `p` between `from` and `to`, where it is monotone; `to` if it has one sign there. Newton's iteration kept
-/// within a shrinking bracket, until a step is below `tolerance`; lanes that are done stay as they are.
+/// Part of the line on which a polynomial is monotone.
+struct Piece<V> {
+    ends: [V; 2],
+    /// Its values there.
+    values: [V; 2],
+    /// Whether its slope is zero there.
+    flat: [bool; 2],
+}
+
+impl<V: Lanes> Piece<V> {
+    /// About where the polynomial is zero, as if it were a parabola around its flat end or, between two of them, a cubic.
+    #[inline(always)]
+    fn guess(&self) -> V {
+        let ([from, to], [a, b]) = (self.ends, self.values.map(V::abs));
+        let (part, width) = (a / (a + b), to - from);
+        let rest = V::constant(1.0) - part;
+        match self.flat {
+            [false, true] => to - width * rest.sqrt(),
+            [true, false] => width.mul_add(part.sqrt(), from),
+            _ => {
+                // 3 x^2 - 2 x^3 is `part` at about this x, up to the middle.
+                let root = part.fast_min(rest).sqrt();
+                let x = root * root.mul_add(V::constant(0.1835), V::constant(0.57735));
+                V::select(part.cmp_lt(rest), width.mul_add(x, from), to - width * x)
+            }
+        }
+    }
+}
+
+/// In `lanes` the root of `p` on a piece of the line; the piece's end where `p` has one sign there. Newton's iteration kept
+/// within a shrinking bracket, until what a step leaves is below `tolerance`; lanes that are done stay as they are.
 #[inline(always)]
-fn monotone_root<V: Lanes, const N: usize>(p: &[V; N], from: V, to: V, tolerance: V) -> V {
-    let zero = V::constant(0.0);
-    let half = V::constant(0.5);
-    let starts_inside = value(p, from).cmp_le(zero);
-    let differs = (starts_inside & !value(p, to).cmp_le(zero)) | (!starts_inside & value(p, to).cmp_le(zero));
-    let mut todo = differs & V::Mask::from_bits(V::ALL);
+fn monotone_root<V: Lanes, const N: usize>(p: &[V; N], lanes: V::Mask, piece: &Piece<V>, tolerance: f64) -> V {
+    let (zero, half, one) = (V::constant(0.0), V::constant(0.5), V::constant(1.0));
+    let [from, to] = piece.ends;
+    let [rises, ends_below] = [piece.values[0].cmp_le(zero), piece.values[1].cmp_le(zero)];
+    let mut todo = lanes & ((rises & !ends_below) | (!rises & ends_below));
+    if !todo.any() {
+        return to;
+    }
+    // Rising in all lanes.
+    let sign = V::select(rises, one, -one);
+    let mut rising = *p;
+    rising.iter_mut().for_each(|x| *x = *x * sign);
+    let (near, tolerance) = (V::constant(4.0 * tolerance.sqrt()), V::constant(tolerance));
     let (mut lo, mut hi) = (from, to);
-    let mut s = V::select(todo, half * (from + to), to);
+    let mut s = V::select(todo, piece.guess(), to);
     for _ in 0..STEPS {
+        let [here, slope, bend] = expansion(&rising, s);
+        let before = here.cmp_le(zero);
+        lo = V::select(before, s, lo);
+        hi = V::select(before, hi, s);
+        let newton = s - here / slope;
+        let kept = lo.cmp_lt(newton) & newton.cmp_lt(hi);
+        let next = V::select(kept, newton, half * (lo + hi));
+        let step = (next - s).abs();
+        // What Newton's step leaves is about step^2 bend / slope.
+        let settled = kept & step.cmp_le(near) & (step * step * bend.abs()).cmp_le(slope * tolerance);
+        s = V::select(todo, next, s);
+        todo = todo & !(settled | step.cmp_le(tolerance));
         if !todo.any() {
             break;
         }
-        let here = value(p, s);
-        let inside = here.cmp_le(zero);
-        // The root is after `s` if `s` is on the side of the start.
-        let before = (inside & starts_inside) | (!inside & !starts_inside);
-        lo = V::select(before & todo, s, lo);
-        hi = V::select(!before & todo, s, hi);
-        let newton = s - here / derivative(p, s);
-        let kept = lo.cmp_lt(newton) & newton.cmp_lt(hi);
-        let next = V::select(kept, newton, half * (lo + hi));
-        let small = (next - s).abs().cmp_le(tolerance);
-        s = V::select(todo, next, s);
-        todo = todo & !small & !(hi - lo).cmp_le(tolerance);
     }
     s
 }

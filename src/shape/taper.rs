@@ -63,16 +63,20 @@ pub fn taper<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, [x, y]: [V::Scalar; 2], mut e
 type S<V> = <V as Lanes>::Scalar;
 
 /// Outward normal (not unit) at a point of a face.
-pub fn taper_normal(p: DVec3, face: u32, [x, y]: [f64; 2]) -> DVec3 {
+pub fn taper_normal(p: DVec3, face: u32, tops: [f64; 2]) -> DVec3 {
     match face {
         1 => DVec3::NEG_Z,
         2 => DVec3::Z,
-        _ => {
-            let (kx, ky) = (x - 1.0, y - 1.0);
-            let (a, b) = (1.0 + kx * p.z, 1.0 + ky * p.z);
-            // Gradient of x^2 b^2 + y^2 a^2 - a^2 b^2, halved.
-            let dz = p.x * p.x * b * ky + p.y * p.y * a * kx - a * b * (kx * b + ky * a);
-            DVec3::new(p.x * b * b, p.y * a * a, dz)
-        }
+        _ => DVec3::from(taper_side_normal(p.to_array(), tops)),
     }
+}
+
+/// Outward normals (not unit) at points of the side.
+#[inline(always)]
+pub fn taper_side_normal<V: Lanes>([x, y, z]: Lanes3<V>, tops: [f64; 2]) -> Lanes3<V> {
+    let (one, [kx, ky]) = (V::constant(1.0), tops.map(|top| V::constant(top - 1.0)));
+    let (a, b) = (kx.mul_add(z, one), ky.mul_add(z, one));
+    // Gradient of x^2 b^2 + y^2 a^2 - a^2 b^2, halved.
+    let dz = (x * x * b).mul_add(ky, y * y * a * kx) - a * b * kx.mul_add(b, ky * a);
+    [x * b * b, y * a * a, dz]
 }

@@ -1,8 +1,6 @@
 //! The canonical torus about the z axis, major radius 1 (Hanrahan, "A survey of ray-surface intersection algorithms",
 //! in Glassner, An Introduction to Ray Tracing, 1989, for the quartic).
 
-use glam::DVec3;
-
 use super::quartic;
 use super::span::{Span, nearest_to_origin};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each};
@@ -66,8 +64,12 @@ impl<V: Lanes> Part<V> {
     }
 }
 
-/// Outward normal (not unit) at a surface point.
-pub fn torus_normal(point: DVec3) -> DVec3 {
-    let round = DVec3::new(point.x, point.y, 0.0);
-    point - round.normalize_or(DVec3::X)
+/// Outward normals (not unit) at surface points.
+#[inline(always)]
+pub fn torus_normal<V: Lanes>(p: Lanes3<V>) -> Lanes3<V> {
+    let (zero, one) = (V::constant(0.0), V::constant(1.0));
+    let round = p[1].mul_add(p[1], p[0] * p[0]).sqrt();
+    let on_axis = round.cmp_eq(zero);
+    let less = one / V::select(on_axis, one, round);
+    [p[0] - V::select(on_axis, one, p[0] * less), p[1] - p[1] * less, p[2]]
 }

@@ -6,7 +6,9 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::runs::{Run, Runs};
 use super::surface::{leaf_magnitude, shape_magnitude};
 use super::{World, solids};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3, space};
+use crate::lanes::chosen::{lanes_of, merge, vector_of};
+use crate::lanes::words::positions;
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, f32x16, map3, space};
 use crate::math::NormalMap;
 use crate::ray::{Hits, INVALID_ID, Rays};
 use crate::scene::assembly::{AssemblyObject, PartKind};
@@ -15,8 +17,9 @@ use crate::scene::solids::Solid;
 
 /// Most facets that an object keeps.
 const MAX_FACETS: usize = 1 << 20;
-/// Numbers of a facet.
+/// Numbers of a facet, and where its constant is.
 const FIELDS: usize = 18;
+const CONSTANT: usize = 12;
 
 /// Outward normal of a face, not unit: `rows * (p - centre) + constant`.
 #[derive(Clone, Copy, Debug)]
@@ -46,13 +49,6 @@ impl<S: Real> Facet<S> {
             *field = S::from_f64(x);
         }
         fields.iter().all(|x| x.is_finite()).then_some(Self { fields })
-    }
-
-    /// A plane with this normal.
-    fn flat(normal: DVec3) -> Self {
-        let mut fields = [S::ZERO; FIELDS];
-        (0..3).for_each(|axis| fields[12 + axis] = S::from_f64(normal[axis]));
-        Self { fields }
     }
 }
 
@@ -162,35 +158,45 @@ impl<S: Real> World<S> {
     /// `ALL`: of all hits, else those with facets.
     #[inline(always)]
     fn look_up<const ALL: bool>(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize, lanes: u32) -> Met<S::Wide> {
-        let n = S::Wide::N;
         let zero = [S::Wide::constant(0.0); 3];
         let none = [INVALID_ID; MAX_LANES];
         let mut met = Met { hit: 0, position: zero, normal: zero, magnitude: zero, part: none, material: none };
-        for lane in 0..n {
-            met.hit |= u32::from(hits.prim[first + lane] != INVALID_ID) << lane;
-        }
-        met.hit &= lanes;
+        let (prims, insts) = (vector_of(&hits.prim[first..], S::Wide::N), vector_of(&hits.inst[first..], S::Wide::N));
+        met.hit = !positions(&prims, INVALID_ID) & S::Wide::ALL & lanes;
         if met.hit == 0 {
             return met;
         }
-        let lead = first + met.hit.trailing_zeros() as usize;
-        let key = |i: usize| (hits.prim[i], hits.inst[i], hits.u[i]);
-        let is_same = (0..n).all(|lane| met.hit >> lane & 1 == 0 || key(first + lane) == key(lead));
-        let (run, facet) = self.facet(hits, lead);
-        let fields: [S::Wide; FIELDS] = match facet {
-            Some(facet) if is_same => {
-                (met.part, met.material) = ([run.part; MAX_LANES], [run.material; MAX_LANES]);
-                vectors(|k| S::Wide::splat(facet.fields[k]))
-            }
-            None if is_same && !ALL => {
-                met.hit = 0;
-                return met;
-            }
-            _ => self.gather::<ALL>(rays, hits, first, &mut met),
-        };
         let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
         let (org, dir, t) = (vector(&rays.org), vector(&rays.dir), S::Wide::load(&hits.t[first..]));
         met.position = each(|axis| dir[axis].mul_add(t, org[axis]));
+        let faces = S::Wide::load(&hits.u[first..]);
+        let mut fields: [S::Wide; FIELDS] = vectors(|_| zero[0]);
+        let mut left = met.hit;
+        while left != 0 {
+            // Lanes that share a facet.
+            let lead = left.trailing_zeros() as usize % MAX_LANES;
+            let face = hits.u[first + lead];
+            let same = positions(&prims, prims[lead]) & positions(&insts, insts[lead]);
+            let same = same & faces.cmp_eq(S::Wide::splat(face)).bits() & left | 1 << lead;
+            left &= !same;
+            let (run, facet) = self.facet(hits, first + lead);
+            let words = <f32x16 as Lanes>::Mask::from_bits(same);
+            met.part = merge(words, run.part, met.part);
+            met.material = merge(words, run.material, met.material);
+            let mask = <S::Wide as Lanes>::Mask::from_bits(same);
+            match facet {
+                Some(facet) => {
+                    fields = vectors(|k| S::Wide::select(mask, S::Wide::splat(facet.fields[k]), fields[k]));
+                }
+                None if ALL => {
+                    let normal = self.not_affine(rays, hits, first, same, met.position);
+                    (0..3).for_each(|axis| {
+                        fields[CONSTANT + axis] = S::Wide::select(mask, normal[axis], fields[CONSTANT + axis]);
+                    });
+                }
+                None => met.hit &= !same,
+            }
+        }
         let row = |k: usize| [fields[3 * k], fields[3 * k + 1], fields[3 * k + 2]];
         let [x, y, z, centre, constant, magnitude] = [row(0), row(1), row(2), row(3), row(4), row(5)];
         let from = space::sub(met.position, centre);
@@ -203,39 +209,38 @@ impl<S: Real> World<S> {
         met
     }
 
-    /// Fields of each hit's facet. Of hits without a facet the normal alone if `ALL`, else they are taken out.
+    /// Outward normals, not unit, of the hits of `lanes` at `position`, which are on one face of one primitive without facet.
     #[inline(never)]
-    fn gather<const ALL: bool>(
+    fn not_affine(
         &self,
         rays: &Rays<S>,
         hits: &Hits<S>,
         first: usize,
-        met: &mut Met<S::Wide>,
-    ) -> [S::Wide; FIELDS] {
-        let mut columns = [[S::ZERO; MAX_LANES]; FIELDS];
-        let mut left = met.hit;
-        while left != 0 {
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let (run, facet) = self.facet(hits, first + lane);
-            (met.part[lane], met.material[lane]) = (run.part, run.material);
-            let own;
-            let facet = match facet {
-                Some(facet) => facet,
-                None if ALL => {
-                    own = self.plain(rays, hits, first + lane);
-                    &own
-                }
-                None => {
-                    met.hit &= !(1 << lane);
-                    continue;
-                }
-            };
-            for (column, &x) in columns.iter_mut().zip(&facet.fields) {
-                column[lane] = x;
-            }
+        lanes: u32,
+        position: Lanes3<S::Wide>,
+    ) -> Lanes3<S::Wide> {
+        let lead = first + lanes.trailing_zeros() as usize;
+        let (prim, inst, face) = (hits.prim[lead], hits.inst[lead], hits.u[lead].to_f64() as u32);
+        if let Some(normals) = self.curved(prim, inst, face, position) {
+            return normals;
         }
-        vectors(|k| S::Wide::load(&columns[k]))
+        let mut columns = [[S::ZERO; MAX_LANES]; 3];
+        for lane in lanes_of(lanes) {
+            let normal = self.plain(rays, hits, first + lane);
+            (0..3).for_each(|axis| columns[axis][lane] = S::from_f64(normal[axis]));
+        }
+        each(|axis| S::Wide::load(&columns[axis]))
+    }
+
+    /// The same of a leaf of solids that stays where its object is and has a kernel for it.
+    #[inline(always)]
+    fn curved(&self, prim: u32, inst: u32, face: u32, position: Lanes3<S::Wide>) -> Option<Lanes3<S::Wide>> {
+        let instance = &self.instances[inst as usize];
+        let (run, place) = self.runs[instance.object as usize].placed(prim);
+        let part = &self.assembly.objects[instance.object as usize].parts[run.part as usize];
+        let (PartKind::Solids(tree), Some(place), true) = (&part.kind, place, instance.identity) else { return None };
+        let solid = &tree.leaves[(prim - part.first_prim) as usize].solid;
+        Some(place.normal_lanes(solids::curved_normal(solid, place.local_lanes(position), face)?))
     }
 
     /// Run and facet of hit `i`.
@@ -248,16 +253,16 @@ impl<S: Real> World<S> {
         (run, kept.filter(|_| instance.identity))
     }
 
-    /// The plane through hit `i`, before its normal is turned.
+    /// Outward normal of hit `i`.
     #[inline(never)]
-    fn plain(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize) -> Facet<S> {
+    fn plain(&self, rays: &Rays<S>, hits: &Hits<S>, i: usize) -> DVec3 {
         let (org, dir) = (DVec3::from(rays.org(i).map(S::to_f64)), DVec3::from(rays.dir(i).map(S::to_f64)));
         let (t, u, v) = (hits.t[i].to_f64(), hits.u[i].to_f64(), hits.v[i].to_f64());
         let (prim, inst) = (hits.prim[i], hits.inst[i]);
         if let Some(outward) = self.outward(org + dir * t, u as u32, prim, inst) {
-            return Facet::flat(outward);
+            return outward;
         }
         let normal = self.surface(org, dir, t, u, v, prim, inst).ng;
-        Facet::flat(if v > 0.5 { -normal } else { normal })
+        if v > 0.5 { -normal } else { normal }
     }
 }

@@ -51,6 +51,15 @@ impl Place {
         })
     }
 
+    /// Normals of the shape's space in the other one, not unit.
+    #[inline]
+    pub fn normal_lanes<V: Lanes>(&self, local: Lanes3<V>) -> Lanes3<V> {
+        let rows = self.normals.matrix().transpose();
+        // Numbers of about one, whatever the map's scale.
+        let scale = 1.0 / rows.to_cols_array().iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        each(|k| dot(each(|axis| V::constant(rows.col(k)[axis] * scale)), local))
+    }
+
     /// A normal of the shape's space in the other one, unit.
     #[inline]
     pub fn normal(&self, local: DVec3) -> DVec3 {

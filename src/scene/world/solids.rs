@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::bvh::Preset;
 use crate::csg::{self, Built, Form, Input, LeafInput, Op, Token, Triangles};
-use crate::lanes::Real;
+use crate::lanes::{Lanes, Lanes3, Real};
 use crate::scene::description::Shape;
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::Solid;
@@ -99,7 +99,7 @@ pub fn solid_normal(solid: &Solid, point: DVec3, face: u32) -> DVec3 {
         Solid::Polyhedron(polyhedron) => {
             polyhedron.planes().get(face as usize).map_or(DVec3::ZERO, |plane| plane.normal)
         }
-        Solid::Torus { .. } => shape::torus_normal(point),
+        Solid::Torus { .. } => DVec3::from(shape::torus_normal(point.to_array())),
         Solid::EllipticTorus { reach, lean } => shape::elliptic_torus_normal(point, [*reach, *lean]),
         Solid::Taper { x, y } => shape::taper_normal(point, face, [*x, *y]),
         Solid::Round { profile } => shape::quadric::round_normal(point, face, *profile),
@@ -109,5 +109,16 @@ pub fn solid_normal(solid: &Solid, point: DVec3, face: u32) -> DVec3 {
             (b - a).cross(c - a)
         }
         Solid::Mesh(_) => DVec3::ZERO,
+    }
+}
+
+/// Outward normals, not unit, at points of face `face` of those solids whose gradient is not affine there; `None` of others,
+/// and of those that are rare.
+#[inline]
+pub fn curved_normal<V: Lanes>(solid: &Solid, point: Lanes3<V>, face: u32) -> Option<Lanes3<V>> {
+    match solid {
+        Solid::Torus { .. } => Some(shape::torus_normal(point)),
+        Solid::Taper { x, y } if face == 0 => Some(shape::taper_side_normal(point, [*x, *y])),
+        _ => None,
     }
 }

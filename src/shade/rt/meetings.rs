@@ -5,6 +5,7 @@ use super::level::{Found, vector};
 use super::material::RtMaterial;
 use super::parameters::{uv, uv_of_arb};
 use super::pattern::Pattern;
+use crate::lanes::chosen::vector_of;
 use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, space};
 use crate::scene::world::World;
@@ -56,7 +57,7 @@ impl<S: Real> Meetings<S> {
         let mut kinds = Kinds { entering, ..Kinds::default() };
         let zero = [S::Wide::constant(0.0); 3];
         let (mut base, mut finishes) = (zero, zero);
-        let regions = words::<S>(&found.region, first);
+        let regions = vector_of(&found.region[first..], S::Wide::N);
         let mut rest = entering;
         while rest != 0 {
             let region = regions[rest.trailing_zeros() as usize % MAX_LANES];
@@ -96,14 +97,6 @@ impl<S: Real> Meetings<S> {
     }
 }
 
-/// The words of a vector of lanes from `first` on.
-#[inline(always)]
-pub(super) fn words<S: Real>(list: &[u32], first: usize) -> [u32; MAX_LANES] {
-    let mut words = [0; MAX_LANES];
-    words[..S::Wide::N].copy_from_slice(&list[first..first + S::Wide::N]);
-    words
-}
-
 /// Colours of `pattern` on those of `lanes`, all in the region of `material`.
 #[inline(never)]
 fn patterned<S: Real>(
@@ -115,7 +108,7 @@ fn patterned<S: Real>(
     first: usize,
     lanes: u32,
 ) -> Lanes3<S::Wide> {
-    let prims = words::<S>(prims, first);
+    let prims = vector_of(&prims[first..], S::Wide::N);
     let (position, normal) = (vector(&found.position, first), vector(&found.normal, first));
     let mut colors = [S::Wide::constant(0.0); 3];
     let mut rest = lanes;

@@ -1,9 +1,8 @@
 //! Whether lights are seen from surfaces: one ray to the middle of each, through whatever lets light pass.
 
 use super::level::{Found, start};
-use super::meetings::words;
 use super::{Rt, TOLERANCE};
-use crate::lanes::chosen::{Chosen, lanes_of};
+use crate::lanes::chosen::{Chosen, lanes_of, vector_of};
 use crate::lanes::words::positions;
 use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
 use crate::ray::Rays;
@@ -119,7 +118,7 @@ fn simple_verdicts<S: Real>(
     visible: &mut [S],
 ) -> u32 {
     let (mut rest, mut simple) = (lanes, 0);
-    let regions = words::<S>(&found.region, first);
+    let regions = vector_of(&found.region[first..], S::Wide::N);
     while rest != 0 {
         let region = regions[rest.trailing_zeros() as usize % MAX_LANES];
         let same = positions(&regions, region) & rest;
