@@ -6,11 +6,11 @@ use glam::{DAffine3, DVec3};
 
 use super::events::Events;
 use super::mesh::{Crossings, Mesh};
-use crate::lanes::{Lanes, Real};
+use crate::lanes::{Lanes, Lanes3, Real};
 use crate::math::{Aabb, Affine, transformed_bounds};
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
-use crate::shape::{self, Cone, Cuboid, Cylinder, HalfSpace, Solid as Canonical, Sphere};
+use crate::shape::{self, Cone, Cuboid, Cylinder, HalfSpace, Solid as Canonical, Span, Sphere};
 
 /// A canonical solid by its numbers.
 #[derive(Clone, Copy)]
@@ -170,27 +170,38 @@ impl<S: Real> Leaf<S> {
             return;
         }
         let mut push = |span| events.push_span(slot, lanes, &span, within);
-        if let Kind::Planes { first, count } = self.kind {
-            let planes = &stores.planes[first as usize..][..count as usize];
-            push(shape::planes_span(packet.org, packet.dir, planes));
-            return;
-        }
-        let (o, d) = (self.to_local.points(packet.org), self.to_local.vectors(packet.dir));
+        let local = || (self.to_local.points(packet.org), self.to_local.vectors(packet.dir));
         let p = self.params;
-        match self.kind {
-            Kind::Sphere => push(Sphere::span(o, d, p[0])),
-            Kind::HalfSpace => push(HalfSpace::span(o, d, p[0])),
-            Kind::Cuboid => push(Cuboid::span(o, d, p[0])),
-            Kind::Cylinder => push(Cylinder::span(o, d, p[0])),
-            Kind::Cone => push(Cone::span(o, d, p[0])),
-            Kind::Round => shape::quadric::round(o, d, p, push),
-            Kind::Trough => shape::quadric::trough(o, d, p, push),
-            Kind::Torus => shape::torus(o, d, p[0], push),
-            Kind::EllipticTorus => shape::elliptic_torus(o, d, [p[0], p[1]], push),
-            Kind::Taper => shape::taper(o, d, [p[0], p[1]], push),
-            Kind::Planes { .. } | Kind::Mesh(_) => {}
-        }
+        // One call for all with a single span: it is large, and the compiler must not leave it out of line.
+        let span = match self.kind {
+            Kind::Planes { first, count } => {
+                let planes = &stores.planes[first as usize..][..count as usize];
+                shape::planes_span(packet.org, packet.dir, planes)
+            }
+            Kind::Sphere => of::<Sphere, V>(local(), p[0]),
+            Kind::HalfSpace => of::<HalfSpace, V>(local(), p[0]),
+            Kind::Cuboid => of::<Cuboid, V>(local(), p[0]),
+            Kind::Cylinder => of::<Cylinder, V>(local(), p[0]),
+            Kind::Cone => of::<Cone, V>(local(), p[0]),
+            kind => {
+                let (o, d) = local();
+                return match kind {
+                    Kind::Round => shape::quadric::round(o, d, p, push),
+                    Kind::Trough => shape::quadric::trough(o, d, p, push),
+                    Kind::Torus => shape::torus(o, d, p[0], push),
+                    Kind::EllipticTorus => shape::elliptic_torus(o, d, [p[0], p[1]], push),
+                    _ => shape::taper(o, d, [p[0], p[1]], push),
+                };
+            }
+        };
+        push(span);
     }
+}
+
+/// The span of a canonical solid.
+#[inline(always)]
+fn of<C: Canonical, V: Lanes>((o, d): (Lanes3<V>, Lanes3<V>), param: V::Scalar) -> Span<V> {
+    C::span(o, d, param)
 }
 
 /// A mesh in the tree's space; a mirroring map turns its triangles round.

@@ -8,7 +8,7 @@ use super::surface::{leaf_magnitude, shape_magnitude};
 use super::{World, solids};
 use crate::lanes::chosen::{lanes_of, merge, vector_of};
 use crate::lanes::words::positions;
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, f32x16, map3, space};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, f32x16, space};
 use crate::math::NormalMap;
 use crate::ray::{Hits, INVALID_ID, Rays};
 use crate::scene::assembly::{AssemblyObject, PartKind};
@@ -17,9 +17,8 @@ use crate::scene::solids::Solid;
 
 /// Most facets that an object keeps.
 const MAX_FACETS: usize = 1 << 20;
-/// Numbers of a facet, and where its constant is.
+/// Numbers of a facet.
 const FIELDS: usize = 18;
-const CONSTANT: usize = 12;
 
 /// Outward normal of a face, not unit: `rows * (p - centre) + constant`.
 #[derive(Clone, Copy, Debug)]
@@ -50,16 +49,19 @@ impl<S: Real> Facet<S> {
         }
         fields.iter().all(|x| x.is_finite()).then_some(Self { fields })
     }
-}
 
-/// `f` of each field; written out, because `map` over so many becomes calls that pass all through memory.
-#[inline(always)]
-fn vectors<V: Lanes>(f: impl Fn(usize) -> V) -> [V; FIELDS] {
-    let mut fields = [V::constant(0.0); FIELDS];
-    for (k, field) in fields.iter_mut().enumerate() {
-        *field = f(k);
+    /// Three of the numbers, from `3 row` on, the same in all lanes.
+    #[inline(always)]
+    fn row<V: Lanes<Scalar = S>>(&self, row: usize) -> Lanes3<V> {
+        each(|k| V::splat(self.fields[3 * row + k]))
     }
-    fields
+
+    /// Outward normals at the points `position`, not unit.
+    #[inline(always)]
+    fn outward<V: Lanes<Scalar = S>>(&self, position: Lanes3<V>) -> Lanes3<V> {
+        let from = space::sub(position, self.row(3));
+        space::add(each(|k| dot(self.row(k), from)), self.row(4))
+    }
 }
 
 /// The facets of one object's shapes and leaves.
@@ -170,7 +172,7 @@ impl<S: Real> World<S> {
         let (org, dir, t) = (vector(&rays.org), vector(&rays.dir), S::Wide::load(&hits.t[first..]));
         met.position = each(|axis| dir[axis].mul_add(t, org[axis]));
         let faces = S::Wide::load(&hits.u[first..]);
-        let mut fields: [S::Wide; FIELDS] = vectors(|_| zero[0]);
+        let mut outward = zero;
         let mut left = met.hit;
         while left != 0 {
             // Lanes that share a facet.
@@ -184,28 +186,25 @@ impl<S: Real> World<S> {
             met.part = merge(words, run.part, met.part);
             met.material = merge(words, run.material, met.material);
             let mask = <S::Wide as Lanes>::Mask::from_bits(same);
-            match facet {
+            let normal = match facet {
                 Some(facet) => {
-                    fields = vectors(|k| S::Wide::select(mask, S::Wide::splat(facet.fields[k]), fields[k]));
+                    if !ALL {
+                        met.magnitude = space::choose(mask, facet.row(5), met.magnitude);
+                    }
+                    facet.outward(met.position)
                 }
-                None if ALL => {
-                    let normal = self.not_affine(rays, hits, first, same, met.position);
-                    (0..3).for_each(|axis| {
-                        fields[CONSTANT + axis] = S::Wide::select(mask, normal[axis], fields[CONSTANT + axis]);
-                    });
+                None if ALL => self.not_affine(rays, hits, first, same, met.position),
+                None => {
+                    met.hit &= !same;
+                    continue;
                 }
-                None => met.hit &= !same,
-            }
+            };
+            outward = space::choose(mask, normal, outward);
         }
-        let row = |k: usize| [fields[3 * k], fields[3 * k + 1], fields[3 * k + 2]];
-        let [x, y, z, centre, constant, magnitude] = [row(0), row(1), row(2), row(3), row(4), row(5)];
-        let from = space::sub(met.position, centre);
-        let outward = space::add(map3([x, y, z], |row| dot(row, from)), constant);
         let turned = S::Wide::constant(0.5).cmp_lt(S::Wide::load(&hits.v[first..]));
         let length = dot(outward, outward).sqrt();
         let scale = S::Wide::constant(1.0) / S::Wide::select(turned, -length, length);
         met.normal = space::scale(outward, scale);
-        met.magnitude = magnitude;
         met
     }
 
