@@ -10,7 +10,7 @@ use crate::lanes::{Lanes, Lanes3, Real};
 use crate::math::{Aabb, Affine, transformed_bounds};
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
-use crate::shape::{self, Cone, Cuboid, Cylinder, HalfSpace, Solid as Canonical, Span, Sphere};
+use crate::shape::{self, Cone, Cuboid, Cylinder, HalfSpace, Solid as Canonical, Span, Sphere, WorldSphere};
 
 /// A canonical solid by its numbers.
 #[derive(Clone, Copy)]
@@ -65,6 +65,8 @@ pub struct LeafInput<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kind {
     Sphere,
+    /// A sphere in the tree's space: centre and radius.
+    Ball,
     HalfSpace,
     Cuboid,
     Cylinder,
@@ -88,7 +90,7 @@ pub(super) enum Kind {
 pub(super) struct Leaf<S> {
     pub(super) kind: Kind,
     pub(super) to_local: Affine<S>,
-    pub(super) params: [S; 3],
+    pub(super) params: [S; 4],
     /// Where it can make a difference: its box, cut by those of the operations above it.
     pub clip: Aabb<S>,
 }
@@ -109,18 +111,22 @@ impl<S: Real> Leaf<S> {
         let to_local = Affine::<S>::from_f64(&inverse);
         let finite = to_local.rows.as_flattened().iter().all(|x| x.is_finite());
         let clip = bounds(&input.to_tree, input.lo, input.hi);
-        let three = |p: [f64; 3]| p.map(S::from_f64);
+        let three = |[x, y, z]: [f64; 3]| [x, y, z, 0.0].map(S::from_f64);
+        let none = [S::ZERO; 4];
         let (kind, params) = match input.form {
-            Form::Sphere => (Kind::Sphere, [S::ZERO; 3]),
-            Form::HalfSpace => (Kind::HalfSpace, [S::ZERO; 3]),
-            Form::Cuboid => (Kind::Cuboid, [S::ZERO; 3]),
-            Form::Cylinder => (Kind::Cylinder, [S::ZERO; 3]),
-            Form::Cone(top) if top >= 1.0 => (Kind::Cylinder, [S::ZERO; 3]),
+            Form::Sphere => match ball(&input.to_tree).map(|ball| ball.map(S::from_f64)) {
+                Some(ball) if ball.iter().all(|x| x.is_finite()) => (Kind::Ball, ball),
+                _ => (Kind::Sphere, none),
+            },
+            Form::HalfSpace => (Kind::HalfSpace, none),
+            Form::Cuboid => (Kind::Cuboid, none),
+            Form::Cylinder => (Kind::Cylinder, none),
+            Form::Cone(top) if top >= 1.0 => (Kind::Cylinder, none),
             Form::Cone(top) => (Kind::Cone, three([top, 0.0, 0.0])),
             Form::Planes(list) => {
                 let first = stores.planes.len() as u32;
                 stores.planes.extend(list.iter().map(|plane| placed_plane(plane, &inverse)));
-                (Kind::Planes { first, count: list.len() as u32 }, [S::ZERO; 3])
+                (Kind::Planes { first, count: list.len() as u32 }, none)
             }
             Form::Round(profile) => (Kind::Round, three(profile)),
             Form::Trough(profile) => (Kind::Trough, three(profile)),
@@ -129,7 +135,7 @@ impl<S: Real> Leaf<S> {
             Form::Taper([x, y]) => (Kind::Taper, three([x, y, 0.0])),
             Form::Mesh(triangles) => {
                 stores.meshes.push(Arc::new(placed_mesh(triangles, &input.to_tree)));
-                (Kind::Mesh(stores.meshes.len() as u32 - 1), [S::ZERO; 3])
+                (Kind::Mesh(stores.meshes.len() as u32 - 1), none)
             }
         };
         let bounded = clip.is_bounded() || !(input.lo.is_finite() && input.hi.is_finite());
@@ -171,31 +177,44 @@ impl<S: Real> Leaf<S> {
         }
         let mut push = |span| events.push_span(slot, lanes, &span, within);
         let local = || (self.to_local.points(packet.org), self.to_local.vectors(packet.dir));
-        let p = self.params;
+        let p @ [p0, p1, p2, _] = self.params;
         // One call for all with a single span: it is large, and the compiler must not leave it out of line.
         let span = match self.kind {
             Kind::Planes { first, count } => {
                 let planes = &stores.planes[first as usize..][..count as usize];
                 shape::planes_span(packet.org, packet.dir, planes)
             }
-            Kind::Sphere => of::<Sphere, V>(local(), p[0]),
-            Kind::HalfSpace => of::<HalfSpace, V>(local(), p[0]),
-            Kind::Cuboid => of::<Cuboid, V>(local(), p[0]),
-            Kind::Cylinder => of::<Cylinder, V>(local(), p[0]),
-            Kind::Cone => of::<Cone, V>(local(), p[0]),
+            Kind::Ball => WorldSphere::span(packet.org, packet.dir, &p),
+            Kind::Sphere => of::<Sphere, V>(local(), p0),
+            Kind::HalfSpace => of::<HalfSpace, V>(local(), p0),
+            Kind::Cuboid => of::<Cuboid, V>(local(), p0),
+            Kind::Cylinder => of::<Cylinder, V>(local(), p0),
+            Kind::Cone => of::<Cone, V>(local(), p0),
             kind => {
                 let (o, d) = local();
                 return match kind {
-                    Kind::Round => shape::quadric::round(o, d, p, push),
-                    Kind::Trough => shape::quadric::trough(o, d, p, push),
-                    Kind::Torus => shape::torus(o, d, p[0], push),
-                    Kind::EllipticTorus => shape::elliptic_torus(o, d, [p[0], p[1]], push),
-                    _ => shape::taper(o, d, [p[0], p[1]], push),
+                    Kind::Round => shape::quadric::round(o, d, [p0, p1, p2], push),
+                    Kind::Trough => shape::quadric::trough(o, d, [p0, p1, p2], push),
+                    Kind::Torus => shape::torus(o, d, p0, push),
+                    Kind::EllipticTorus => shape::elliptic_torus(o, d, [p0, p1], push),
+                    _ => shape::taper(o, d, [p0, p1], push),
                 };
             }
         };
         push(span);
     }
+}
+
+/// Centre and radius of the unit sphere's image, if that is a sphere but for rounding in `f64`.
+fn ball(to_tree: &DAffine3) -> Option<[f64; 4]> {
+    let axes = to_tree.matrix3;
+    let square = axes.x_axis.length_squared();
+    let is_nothing = |x: f64| x.abs() <= 8.0 * f64::EPSILON * square;
+    let even = [axes.y_axis, axes.z_axis].iter().all(|axis| is_nothing(axis.length_squared() - square));
+    let [xy, yz, zx] = [axes.x_axis.dot(axes.y_axis), axes.y_axis.dot(axes.z_axis), axes.z_axis.dot(axes.x_axis)];
+    let [x, y, z] = to_tree.translation.to_array();
+    let is_ball = square.is_normal() && even && [xy, yz, zx].into_iter().all(is_nothing);
+    is_ball.then_some([x, y, z, square.sqrt()])
 }
 
 /// The span of a canonical solid.

@@ -96,9 +96,14 @@ impl<V: Lanes> Span<V> {
 /// which is the size of the shape where a flat one is seen from 10^6 local units away; the second makes up for it.
 #[inline(always)]
 pub fn nearest_to_origin<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>) -> (Lanes3<V>, V) {
-    let square = crate::lanes::dot(d, d);
+    nearest_by(o, d, V::constant(1.0) / crate::lanes::dot(d, d))
+}
+
+/// The same with one over the square of `d`'s length.
+#[inline(always)]
+pub fn nearest_by<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, rcp_square: V) -> (Lanes3<V>, V) {
     let step = |o: Lanes3<V>| {
-        let shift = -(crate::lanes::dot(o, d) / square);
+        let shift = -(crate::lanes::dot(o, d) * rcp_square);
         (each(|a| d[a].mul_add(shift, o[a])), shift)
     };
     let (rough, first) = step(o);

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::span::{Solid, Span, nearest_to_origin};
+use super::span::{Solid, Span, nearest_by};
 use crate::lanes::{Lanes, Lanes3, Real, dot, each};
 use crate::math::Aabb;
 
@@ -22,9 +22,10 @@ pub type SphereRecord<S> = [S; 4];
 
 #[inline(always)]
 fn sphere_span<V: Lanes>(o: Lanes3<V>, d: Lanes3<V>, radius: V) -> Span<V> {
-    let (near, shift) = nearest_to_origin(o, d);
+    let rcp_square = V::constant(1.0) / dot(d, d);
+    let (near, shift) = nearest_by(o, d, rcp_square);
     let room = radius.mul_add(radius, -dot(near, near));
-    let half = (room / dot(d, d)).sqrt();
+    let half = (room * rcp_square).sqrt();
     Span::plain(V::constant(0.0).cmp_le(room), shift - half, shift + half)
 }
 
