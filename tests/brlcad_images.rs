@@ -1,10 +1,12 @@
 //! BRL-CAD's own benchmark images, pixel by pixel, in the classes of its `pixcmp`.
 
+use std::path::Path;
+
 use lanecast::camera::Camera;
 use lanecast::film::pix;
 use lanecast::render::{RenderOptions, Silent, render};
-use lanecast::scene::brlcad::describe::Options;
-use lanecast::scene::brlcad::view;
+use lanecast::scene::brlcad::describe::{Options, describe};
+use lanecast::scene::brlcad::{self, view};
 use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::world::{Preset, World};
 use lanecast::shade::Integrator;
@@ -91,4 +93,46 @@ fn star_and_m35_render() {
         assert!(bright > 50_000, "{name}: {bright} pixels");
         check_f32(name, top, &once);
     }
+}
+
+/// Colour of the middle of a small picture of `text`, seen from `eye` with the orientation `turn` (a quaternion), and how many
+/// of its pixels are otherwise.
+fn middle<S: Engines>(text: &str, eye: &str, turn: &str) -> ([u8; 3], usize) {
+    let file = Path::new("d.asc");
+    let database = brlcad::parse(file, text.as_bytes()).unwrap();
+    let description = describe(file, "d", &database, &Options::default()).unwrap();
+    let world = World::<S>::compile(&description, Preset::Balanced).unwrap();
+    let script = format!("viewsize 10;\norientation {turn};\neye_pt {eye};\nstart 0;\nend;\n");
+    let camera = Camera::of_view(&view::parse(Path::new("d.rt"), script.as_bytes()).unwrap(), 1.0).unwrap();
+    let options = RenderOptions { width: 40, height: 40, integrator: Integrator::Rt, ..Default::default() };
+    let film = render(&world, &description, &camera, &options, &Silent).unwrap().film;
+    let bytes = pix::to_bytes(&film, 0.0).unwrap();
+    let pixels: Vec<[u8; 3]> = bytes.chunks_exact(3).map(|pixel| pixel.try_into().unwrap()).collect();
+    let middle = pixels[20 * 40 + 20];
+    (middle, pixels.iter().filter(|pixel| **pixel != middle).count())
+}
+
+/// The inside of a region without bounds, by its definition: 0.18 where a ray never leaves it, and 0.8^6 of that where it
+/// does; the darkest blue outside.
+#[test]
+fn the_inside_of_a_half_space() {
+    let ground = "title {t}\nunits mm\nput h half N {0 0 1} d 0\nput r comb region yes tree {l h}\n";
+    // A ball is in the way of nothing: it is far off to the side. Solid all around a hollow is endless another way.
+    let hollow = "title {t}\nunits mm\nput h half N {0 0 1} d 9e5\nput b ell V {0 0 0} A {3 0 0} B {0 3 0} C {0 0 3}\n\
+        put r comb region yes tree {- {l h} {l b}}\n";
+    let (down, up, level) = ("0 0 0 1", "1 0 0 0", "0.7071067811865476 0 0 0.7071067811865476");
+    let (inside, leaving, outside) = ([46; 3], [12; 3], [0, 0, 1]);
+    for (text, eye, turn, seen) in [
+        (ground, "0 0 -7", down, inside),
+        (ground, "0 0 -7", level, inside),
+        (ground, "0 0 -7", up, leaving),
+        (ground, "0 0 7", up, outside),
+        (ground, "0 0 7", level, outside),
+        (hollow, "0 0 -7", down, inside),
+        (hollow, "0 0 -7", level, inside),
+    ] {
+        assert_eq!(middle::<f64>(text, eye, turn), (seen, 0), "{eye} {turn}");
+        assert_eq!(middle::<f32>(text, eye, turn), (seen, 0), "{eye} {turn} in f32");
+    }
+    assert_eq!(middle::<f64>(hollow, "0 0 -7", up).0, leaving);
 }

@@ -62,10 +62,11 @@ impl<S: Real> World<S> {
         let runs: Vec<Runs> = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
         let facets = assembly.objects.iter().zip(&runs).map(|(o, runs)| Facets::new(o, runs)).collect();
         let rounding = Rounding::of(&assembly.placements, &objects);
-        let kinds = objects
-            .iter()
-            .map(Object::kinds)
-            .fold(Kinds::default(), |a, b| Kinds { shapes: a.shapes || b.shapes, others: a.others || b.others });
+        let kinds = objects.iter().map(Object::kinds).fold(Kinds::default(), |a, b| Kinds {
+            shapes: a.shapes || b.shapes,
+            others: a.others || b.others,
+            sorting: a.sorting || b.sorting,
+        });
         let build_seconds = start.elapsed().as_secs_f64();
         Ok(Self {
             assembly,

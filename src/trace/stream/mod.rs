@@ -139,13 +139,13 @@ impl<S: Real> Job<'_, S> {
         self.sorted::<V, ANY, COUNT>();
     }
 
-    /// Traces a vector of rays of one or two octants (any-hit: of any) as a packet, or sorts its live rays. Returns how many were
-    /// sorted. Packets test a shape in all lanes at once, chunks ray by ray; rays that only ask whether there is anything
-    /// are done too soon for chunks to make up for that.
+    /// Traces a vector of rays as a packet, or, if they are of more than two octants and the world repays it, sorts its live
+    /// rays. Returns how many were sorted. Rays of a chunk that meet a shape are scattered over its vectors; those that only ask
+    /// whether there is anything are done too soon for chunks to make up for that.
     #[inline(always)]
     fn among_shapes<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
         let (packet, t_max, live) = self.load::<V, COUNT>(at);
-        let alike = live != 0 && (ANY || Signs::of(&packet).nearly_agree(live));
+        let alike = live != 0 && (ANY || !self.world.kinds.sorting || Signs::of(&packet).nearly_agree(live));
         if alike {
             self.trace::<V, ANY, COUNT>(at, &packet, t_max, live);
             return 0;
