@@ -2,6 +2,7 @@
 
 use super::words::{list_bits, positions};
 use super::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, f32x16};
+use wide::u32x8;
 
 /// The numbers of the set bits of `bits`, in order.
 #[inline(always)]
@@ -21,12 +22,14 @@ pub fn packets<V: Lanes>(lanes: &[u32]) -> impl Iterator<Item = (usize, u32)> {
     numbered.map(|(k, &bits)| (k * V::N, bits))
 }
 
-/// The first `n` words of `list`, and zeros.
+/// Which of the first `N` words of `list`, one for each lane of `V`, are `wanted`, as bits.
 #[inline(always)]
-pub fn vector_of(list: &[u32], n: usize) -> [u32; MAX_LANES] {
-    let mut words = [0; MAX_LANES];
-    words[..n].copy_from_slice(&list[..n]);
-    words
+pub fn positions_in<V: Lanes>(list: &[u32], wanted: u32) -> u32 {
+    match (V::N, list.first_chunk(), list.first_chunk()) {
+        (16, Some(list), _) => positions(list, wanted),
+        (8, _, Some(list)) => u32x8::new(*list).simd_eq(u32x8::splat(wanted)).to_bitmask(),
+        _ => list.iter().take(V::N).rev().fold(0, |bits, &word| bits << 1 | u32::from(word == wanted)),
+    }
 }
 
 /// A list with `new` where the mask is set. Numbers are moved as floats: selection copies bits.
@@ -212,7 +215,7 @@ impl Picked {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::{f32x16, f64x4};
+    use crate::lanes::{f32x4, f32x8, f32x16, f64x4};
 
     #[test]
     fn some_lanes_come_in_order() {
@@ -234,6 +237,19 @@ mod tests {
         let mut to = [0.0; 4];
         Chosen::of(0b1100).pack(f64x4::new([1.0, 2.0, 3.0, 4.0]), &mut to);
         assert_eq!(to, [3.0, 4.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn positions_of_any_width() {
+        let list: Vec<u32> = (0..40).map(|i| i * i % 7).collect();
+        let expected = |from: usize, n: usize| (0..n).filter(|i| list[from + i] == 2).fold(0, |bits, i| bits | 1 << i);
+        for from in 0..20 {
+            let rest = &list[from..];
+            assert_eq!(positions_in::<f32x16>(rest, 2), expected(from, 16));
+            assert_eq!(positions_in::<f32x8>(rest, 2), expected(from, 8));
+            assert_eq!(positions_in::<f32x4>(rest, 2), expected(from, 4));
+            assert_eq!(positions_in::<f32>(rest, 2), expected(from, 1));
+        }
     }
 
     #[test]

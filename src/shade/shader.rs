@@ -172,7 +172,8 @@ impl<'a, S: Real> Shader<'a, S> {
     /// The same with the lighting model of [`Integrator::Rt`], seen by `camera`: of use for BRL-CAD databases only.
     #[must_use]
     pub fn with_rt(mut self, description: &Description, camera: &Camera) -> Self {
-        self.rt = description.looks.as_ref().map(|looks| Rt::new(looks, camera));
+        let object = &self.world.assembly.objects[0];
+        self.rt = description.looks.as_ref().map(|looks| Rt::new(looks, object, camera));
         self
     }
 

@@ -6,8 +6,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::runs::{Run, Runs};
 use super::surface::{leaf_magnitude, shape_magnitude};
 use super::{World, solids};
-use crate::lanes::chosen::{lanes_of, merge, vector_of};
-use crate::lanes::words::positions;
+use crate::lanes::chosen::{lanes_of, merge, positions_in};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, f32x16, space};
 use crate::math::NormalMap;
 use crate::ray::{Hits, INVALID_ID, Rays};
@@ -157,14 +156,30 @@ impl<S: Real> World<S> {
         met
     }
 
+    /// Lanes of hits `first..first + N` that hit something, and the part of each, see [`World::part`].
+    #[inline]
+    pub fn met_parts(&self, hits: &Hits<S>, first: usize) -> (u32, [u32; MAX_LANES]) {
+        let (prims, insts) = (&hits.prim[first..], &hits.inst[first..]);
+        let hit = !positions_in::<S::Wide>(prims, INVALID_ID) & S::Wide::ALL;
+        let (mut parts, mut left) = ([INVALID_ID; MAX_LANES], hit);
+        while left != 0 {
+            let lead = left.trailing_zeros() as usize % MAX_LANES;
+            let same = positions_in::<S::Wide>(prims, prims[lead]) & positions_in::<S::Wide>(insts, insts[lead]) & left;
+            left &= !same;
+            let run = self.runs[self.instances[insts[lead] as usize].object as usize].of(prims[lead]);
+            parts = merge(<f32x16 as Lanes>::Mask::from_bits(same), run.part, parts);
+        }
+        (hit, parts)
+    }
+
     /// `ALL`: of all hits, else those with facets.
     #[inline(always)]
     fn look_up<const ALL: bool>(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize, lanes: u32) -> Met<S::Wide> {
         let zero = [S::Wide::constant(0.0); 3];
         let none = [INVALID_ID; MAX_LANES];
         let mut met = Met { hit: 0, position: zero, normal: zero, magnitude: zero, part: none, material: none };
-        let (prims, insts) = (vector_of(&hits.prim[first..], S::Wide::N), vector_of(&hits.inst[first..], S::Wide::N));
-        met.hit = !positions(&prims, INVALID_ID) & S::Wide::ALL & lanes;
+        let (prims, insts) = (&hits.prim[first..], &hits.inst[first..]);
+        met.hit = !positions_in::<S::Wide>(prims, INVALID_ID) & S::Wide::ALL & lanes;
         if met.hit == 0 {
             return met;
         }
@@ -178,7 +193,7 @@ impl<S: Real> World<S> {
             // Lanes that share a facet.
             let lead = left.trailing_zeros() as usize % MAX_LANES;
             let face = hits.u[first + lead];
-            let same = positions(&prims, prims[lead]) & positions(&insts, insts[lead]);
+            let same = positions_in::<S::Wide>(prims, prims[lead]) & positions_in::<S::Wide>(insts, insts[lead]);
             let same = same & faces.cmp_eq(S::Wide::splat(face)).bits() & left | 1 << lead;
             left &= !same;
             let (run, facet) = self.facet(hits, first + lead);

@@ -47,7 +47,8 @@ impl Endless {
     pub fn may_hold<V: Lanes>(&self, dir: Lanes3<V>, lanes: u32) -> u32 {
         let below = |n: &DVec3| dot(n.to_array().map(V::constant), dir).cmp_le(V::constant(ALONG)).bits();
         match &self.reach {
-            Reach::Below(normals) => normals.iter().fold(0, |held, normal| held | below(normal) & lanes),
+            Reach::Below(normals) if lanes != 0 => normals.iter().fold(0, |held, normal| held | below(normal)) & lanes,
+            Reach::Below(_) => 0,
             Reach::Everywhere => lanes,
         }
     }

@@ -45,8 +45,15 @@ impl<S: Real> Level<S> {
         self.carry.clear();
         self.within.clear();
         let tolerance = S::Wide::constant(TOLERANCE);
+        // Those of parallel projection all have one direction.
+        let mut last = [[S::Wide::constant(0.0); 3]; 2];
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
-            let (org, dir) = (vector(&rays.org, first), space::normalize(vector(&rays.dir, first)));
+            let (org, dir) = (vector(&rays.org, first), vector(&rays.dir, first));
+            let [x, y, z] = each(|axis| dir[axis].cmp_eq(last[0][axis]));
+            if (x & y & z).bits() != S::Wide::ALL {
+                last = [dir, space::normalize(dir)];
+            }
+            let dir = last[1];
             for axis in 0..3 {
                 org[axis].store(&mut self.rays.org[axis][first..]);
                 dir[axis].store(&mut self.rays.dir[axis][first..]);
@@ -130,29 +137,36 @@ pub(super) struct Found<S> {
 impl<S: Real> Found<S> {
     /// Of `rays`, whose hits are `hits`.
     pub fn set(&mut self, world: &World<S>, rays: &Rays<S>, hits: &Hits<S>) {
-        let padded = rays.padded_len();
+        self.open(rays.padded_len());
+        (0..self.hit.len()).for_each(|k| self.set_vector(k, world, rays, hits));
+    }
+
+    /// Nothing yet, of `padded` rays; [`Self::set_vector`] sets some.
+    pub fn open(&mut self, padded: usize) {
         for array in self.position.iter_mut().chain(&mut self.normal).chain([&mut self.t]) {
             array.resize(padded, S::ZERO);
         }
         self.region.resize(padded, 0);
-        self.hit.clear();
-        self.leaving.clear();
-        for first in (0..padded).step_by(S::Wide::N) {
-            let met = world.met(rays, hits, first);
-            self.hit.push(met.hit);
-            if met.hit == 0 {
-                self.leaving.push(0);
-                continue;
-            }
-            let leaving = S::Wide::constant(0.0).cmp_lt(dot(met.normal, vector(&rays.dir, first))).bits();
-            self.leaving.push(leaving & met.hit);
-            for axis in 0..3 {
-                met.position[axis].store(&mut self.position[axis][first..]);
-                met.normal[axis].store(&mut self.normal[axis][first..]);
-            }
-            S::Wide::load(&hits.t[first..]).store(&mut self.t[first..]);
-            self.region[first..][..S::Wide::N].copy_from_slice(&met.part[..S::Wide::N]);
+        self.hit.resize(padded / S::Wide::N, 0);
+        self.leaving.resize(padded / S::Wide::N, 0);
+    }
+
+    /// Sets what vector `k` of lanes has met.
+    #[inline]
+    pub fn set_vector(&mut self, k: usize, world: &World<S>, rays: &Rays<S>, hits: &Hits<S>) {
+        let first = k * S::Wide::N;
+        let met = world.met(rays, hits, first);
+        (self.hit[k], self.leaving[k]) = (met.hit, 0);
+        if met.hit == 0 {
+            return;
         }
+        self.leaving[k] = S::Wide::constant(0.0).cmp_lt(dot(met.normal, vector(&rays.dir, first))).bits() & met.hit;
+        for axis in 0..3 {
+            met.position[axis].store(&mut self.position[axis][first..]);
+            met.normal[axis].store(&mut self.normal[axis][first..]);
+        }
+        S::Wide::load(&hits.t[first..]).store(&mut self.t[first..]);
+        self.region[first..][..S::Wide::N].copy_from_slice(&met.part[..S::Wide::N]);
     }
 
     /// Whether ray `i` met something.

@@ -5,8 +5,7 @@ use super::level::{Found, vector};
 use super::material::RtMaterial;
 use super::parameters::{uv, uv_of_arb};
 use super::pattern::Pattern;
-use crate::lanes::chosen::vector_of;
-use crate::lanes::words::positions;
+use crate::lanes::chosen::positions_in;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, space};
 use crate::scene::world::World;
 
@@ -54,14 +53,17 @@ impl<S: Real> Meetings<S> {
     /// leaves `prims`.
     #[inline]
     pub fn add(&mut self, rt: &Rt, world: &World<S>, found: &Found<S>, prims: &[u32], first: usize, entering: u32) {
+        if entering == 0 {
+            return self.kinds.push(Kinds::default());
+        }
         let mut kinds = Kinds { entering, ..Kinds::default() };
         let zero = [S::Wide::constant(0.0); 3];
         let (mut base, mut finishes) = (zero, zero);
-        let regions = vector_of(&found.region[first..], S::Wide::N);
+        let regions = &found.region[first..];
         let mut rest = entering;
         while rest != 0 {
             let region = regions[rest.trailing_zeros() as usize % MAX_LANES];
-            let same = positions(&regions, region) & rest;
+            let same = positions_in::<S::Wide>(regions, region) & rest;
             rest &= !same;
             let mask = <S::Wide as Lanes>::Mask::from_bits(same);
             let material = &rt.materials[region as usize];
@@ -81,11 +83,9 @@ impl<S: Real> Meetings<S> {
             kinds.transmits |= if transmits { same } else { 0 };
             kinds.sends |= if transmits || reflects { same } else { 0 };
         }
-        if entering != 0 {
-            for axis in 0..3 {
-                base[axis].store(&mut self.base[axis][first..]);
-                finishes[axis].store(&mut self.finish[axis][first..]);
-            }
+        for axis in 0..3 {
+            base[axis].store(&mut self.base[axis][first..]);
+            finishes[axis].store(&mut self.finish[axis][first..]);
         }
         self.kinds.push(kinds);
     }
@@ -108,13 +108,13 @@ fn patterned<S: Real>(
     first: usize,
     lanes: u32,
 ) -> Lanes3<S::Wide> {
-    let prims = vector_of(&prims[first..], S::Wide::N);
+    let prims = &prims[first..];
     let (position, normal) = (vector(&found.position, first), vector(&found.normal, first));
     let mut colors = [S::Wide::constant(0.0); 3];
     let mut rest = lanes;
     while rest != 0 {
         let lead = rest.trailing_zeros() as usize % MAX_LANES;
-        let same = positions(&prims, prims[lead]) & rest;
+        let same = positions_in::<S::Wide>(prims, prims[lead]) & rest;
         rest &= !same;
         let at = uv(world, found.region[first + lead], prims[lead], position, normal)
             .unwrap_or_else(|| uv_of_arb(material.faces(), position, normal));

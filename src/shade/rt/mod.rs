@@ -9,6 +9,7 @@
 //! Like the other integrators, this one works on batches: a level of paths is one batch of rays, its shadow rays are
 //! compact batches of their own; normals and lighting are computed in lanes.
 
+mod endless;
 mod glass;
 mod lamp;
 mod level;
@@ -22,6 +23,7 @@ mod sort;
 
 use glam::DVec3;
 
+use self::endless::Endless;
 use self::lamp::Lamp;
 use self::level::{Found, Level};
 use self::material::RtMaterial;
@@ -33,6 +35,7 @@ use crate::camera::Camera;
 use crate::lanes::chosen::lanes_of;
 use crate::lanes::{Lanes, Real};
 use crate::ray::Rays;
+use crate::scene::assembly::AssemblyObject;
 use crate::scene::brlcad::describe::Looks;
 pub use material::unknown_shaders;
 use pattern::Pattern;
@@ -57,8 +60,7 @@ pub(super) struct Rt {
     materials: Vec<RtMaterial>,
     lamps: Vec<Lamp>,
     surroundings: Option<Pattern>,
-    /// Whether each region has no bounds: a ray may start inside and never leave it.
-    unbounded: Vec<bool>,
+    endless: Endless,
 }
 
 /// A ray on its way.
@@ -124,12 +126,13 @@ pub(super) struct Memory<S> {
 }
 
 impl Rt {
-    /// Regions that look like `looks`, lit by their own lights, or by one over the viewer's left shoulder.
-    pub fn new(looks: &Looks, camera: &Camera) -> Self {
+    /// Regions that look like `looks`, the parts of `object`, lit by their own lights, or by one over the viewer's left
+    /// shoulder.
+    pub fn new(looks: &Looks, object: &AssemblyObject, camera: &Camera) -> Self {
         let materials: Vec<RtMaterial> = looks.regions.iter().map(RtMaterial::of).collect();
         let surroundings = looks.surroundings.as_ref().and_then(|shader| Pattern::of(shader.layers.first()?));
-        let unbounded = looks.regions.iter().map(|look| look.bounds.is_none()).collect();
-        Self { lamps: lamp::lamps(looks, &materials, camera), materials, surroundings, unbounded }
+        let endless = Endless::new(looks, object);
+        Self { lamps: lamp::lamps(looks, &materials, camera), materials, surroundings, endless }
     }
 }
 

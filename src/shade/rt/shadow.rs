@@ -2,9 +2,9 @@
 
 use super::level::{Found, start};
 use super::{Rt, TOLERANCE};
-use crate::lanes::chosen::{Chosen, lanes_of, vector_of};
+use crate::lanes::chosen::{Chosen, lanes_of};
 use crate::lanes::words::positions;
-use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real};
 use crate::ray::Rays;
 use crate::shade::shader::{Shader, Workspace};
 
@@ -80,17 +80,24 @@ impl<S: Real> Shader<'_, S> {
         work: &mut Workspace<S>,
     ) {
         let tolerance = S::from_f64(TOLERANCE);
+        let mut is_first = true;
         while !probes.carry.is_empty() {
-            let count = probes.carry.len();
-            work.rays.shadow += count as u64;
+            work.rays.shadow += probes.carry.len() as u64;
             self.intersect_all(&probes.rays, work);
-            found.set(self.world, &probes.rays, &work.hits);
-            next.open(count);
-            for (k, &hit) in found.hit.iter().enumerate() {
+            found.open(probes.rays.padded_len());
+            next.open(probes.carry.len());
+            for k in 0..found.hit.len() {
                 // A light is a thing: a ray that meets nothing has missed it.
                 let first = k * S::Wide::N;
-                let simple = simple_verdicts(rt, first, hit & !found.leaving[k], probes, found, visible);
-                for i in lanes_of(hit & !simple).map(|lane| first + lane) {
+                let (hit, regions) = self.world.met_parts(&work.hits, first);
+                let mut rest = hit;
+                if is_first {
+                    rest &= !simple_verdicts(rt, first, hit, &regions, probes, &work.hits.t, visible);
+                }
+                if rest != 0 {
+                    found.set_vector(k, self.world, &probes.rays, &work.hits);
+                }
+                for i in lanes_of(rest).map(|lane| first + lane) {
                     let probe = &probes.carry[i];
                     match judge(rt, probe, i, found) {
                         Verdict::Arrives => visible[probe.slot as usize] = S::from_f64(probe.filter),
@@ -103,25 +110,28 @@ impl<S: Real> Shader<'_, S> {
             }
             next.close();
             std::mem::swap(probes, next);
+            is_first = false;
         }
     }
 }
 
-/// Of `lanes`, which enter regions, those that enter lights or what nothing passes through: the former arrive.
+/// Of probes `lanes` that come straight from a surface and have met something, in `regions`, those for which it makes no
+/// difference which side of it: they have met lights, and arrive, or what nothing passes through.
 #[inline]
 fn simple_verdicts<S: Real>(
     rt: &Rt,
     first: usize,
     lanes: u32,
+    regions: &[u32; MAX_LANES],
     probes: &Probes<S>,
-    found: &Found<S>,
+    t: &[S],
     visible: &mut [S],
 ) -> u32 {
-    let (mut rest, mut simple) = (lanes, 0);
-    let regions = vector_of(&found.region[first..], S::Wide::N);
+    let is_far = S::Wide::constant(THIN_AT_START).cmp_le(S::Wide::load(&t[first..]));
+    let (mut rest, mut simple) = (lanes & is_far.bits(), 0);
     while rest != 0 {
         let region = regions[rest.trailing_zeros() as usize % MAX_LANES];
-        let same = positions(&regions, region) & rest;
+        let same = positions(regions, region) & rest;
         rest &= !same;
         let material = &rt.materials[region as usize];
         if material.is_light {

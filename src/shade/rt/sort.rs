@@ -40,19 +40,21 @@ impl<S: Real> Shader<'_, S> {
     /// Rays that nothing stops: the surroundings, or the inside of a solid without end.
     pub(super) fn rt_lost(&self, rt: &Rt, memory: &mut Memory<S>, work: &mut Workspace<S>, out: &mut Samples) {
         let Memory { level, lost, inside, back, shadow, .. } = memory;
+        // A ray that starts inside a region without bounds leaves it when it looks back.
+        let dir = |k: usize| vector(&level.rays.dir, k * S::Wide::N);
         inside.clear();
-        inside.resize(lost.len(), 0);
-        if rt.unbounded.contains(&true) && lost.iter().any(|&lanes| lanes != 0) {
-            // A ray that starts inside a region without bounds leaves it when it looks back.
+        inside.extend(lost.iter().enumerate().map(|(k, &lanes)| rt.endless.may_hold(dir(k), lanes)));
+        let doubtful: Vec<usize> = packets::<S::Wide>(inside)
+            .flat_map(|(first, lanes)| lanes_of(lanes).map(move |lane| first + lane))
+            .collect();
+        if !doubtful.is_empty() {
             let turned = |path: Path| Path { dir: -path.dir, ..path };
-            let all =
-                || packets::<S::Wide>(lost).flat_map(|(first, lanes)| lanes_of(lanes).map(move |lane| first + lane));
-            back.open(&all().map(|i| turned(level.path(i))).collect::<Vec<_>>());
+            back.open(&doubtful.iter().map(|&i| turned(level.path(i))).collect::<Vec<_>>());
             self.intersect_all(&back.rays, work);
             shadow.set(self.world, &back.rays, &work.hits);
-            for (k, i) in all().enumerate() {
-                let is_inside = shadow.is_leaving(k) && rt.unbounded[shadow.region[k] as usize];
-                inside[i / S::Wide::N] |= u32::from(is_inside) << (i % S::Wide::N);
+            for (k, &i) in doubtful.iter().enumerate() {
+                let is_inside = shadow.is_leaving(k) && rt.endless.contains(shadow.region[k]);
+                inside[i / S::Wide::N] &= !(u32::from(!is_inside) << (i % S::Wide::N));
             }
         }
         let mut sky = Sky { pattern: rt.surroundings.as_ref(), last: Default::default() };
