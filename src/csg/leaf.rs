@@ -175,10 +175,9 @@ impl<S: Real> Leaf<S> {
             mesh.boundaries(packet, within, eps, (slot, lanes), crossings, events);
             return;
         }
-        let mut push = |span| events.push_span(slot, lanes, &span, within);
         let local = || (self.to_local.points(packet.org), self.to_local.vectors(packet.dir));
         let p @ [p0, p1, p2, _] = self.params;
-        // One call for all with a single span: it is large, and the compiler must not leave it out of line.
+        // One call for all with a single span, apart from the others': it is large, and the compiler left it out of line.
         let span = match self.kind {
             Kind::Planes { first, count } => {
                 let planes = &stores.planes[first as usize..][..count as usize];
@@ -192,6 +191,7 @@ impl<S: Real> Leaf<S> {
             Kind::Cone => of::<Cone, V>(local(), p0),
             kind => {
                 let (o, d) = local();
+                let push = |span| events.push_span(slot, lanes, &span, within);
                 return match kind {
                     Kind::Round => shape::quadric::round(o, d, [p0, p1, p2], push),
                     Kind::Trough => shape::quadric::trough(o, d, [p0, p1, p2], push),
@@ -201,7 +201,7 @@ impl<S: Real> Leaf<S> {
                 };
             }
         };
-        push(span);
+        events.push_span(slot, lanes, &span, within);
     }
 }
 
