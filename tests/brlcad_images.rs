@@ -117,22 +117,23 @@ fn middle<S: Engines>(text: &str, eye: &str, turn: &str) -> ([u8; 3], usize) {
 #[test]
 fn the_inside_of_a_half_space() {
     let ground = "title {t}\nunits mm\nput h half N {0 0 1} d 0\nput r comb region yes tree {l h}\n";
-    // A ball is in the way of nothing: it is far off to the side. Solid all around a hollow is endless another way.
     let hollow = "title {t}\nunits mm\nput h half N {0 0 1} d 9e5\nput b ell V {0 0 0} A {3 0 0} B {0 3 0} C {0 0 3}\n\
         put r comb region yes tree {- {l h} {l b}}\n";
-    let (down, up, level) = ("0 0 0 1", "1 0 0 0", "0.7071067811865476 0 0 0.7071067811865476");
+    let (down, up) = ("0 0 0 1", "1 0 0 0");
+    let (aslant, rising) = ("0.3826834323650898 0 0 0.9238795325112867", "0.9238795325112867 0 0 0.3826834323650898");
     let (inside, leaving, outside) = ([46; 3], [12; 3], [0, 0, 1]);
     for (text, eye, turn, seen) in [
         (ground, "0 0 -7", down, inside),
-        (ground, "0 0 -7", level, inside),
+        (ground, "0 0 -7", aslant, inside),
+        (ground, "0 0 -7", rising, leaving),
         (ground, "0 0 -7", up, leaving),
         (ground, "0 0 7", up, outside),
-        (ground, "0 0 7", level, outside),
-        (hollow, "0 0 -7", down, inside),
-        (hollow, "0 0 -7", level, inside),
+        (ground, "0 0 7", rising, outside),
+        (hollow, "0 0 -9", down, inside),
+        (hollow, "0 0 -9", aslant, inside),
     ] {
         assert_eq!(middle::<f64>(text, eye, turn), (seen, 0), "{eye} {turn}");
         assert_eq!(middle::<f32>(text, eye, turn), (seen, 0), "{eye} {turn} in f32");
     }
-    assert_eq!(middle::<f64>(hollow, "0 0 -7", up).0, leaving);
+    assert_eq!(middle::<f64>(hollow, "0 0 -9", up).0, leaving);
 }

@@ -161,9 +161,14 @@ mod tests {
 
     #[test]
     fn directions_go_once_around() {
-        assert_eq!(uv_of_direction([1.0, 0.0, 0.0]), [0.0, 0.5]);
-        assert_eq!(uv_of_direction([0.0, 2.0, 0.0]), [0.25, 0.5]);
-        assert_eq!(uv_of_direction([0.0, -1.0, 0.0]), [0.75, 0.5]);
-        assert_eq!(uv_of_direction([0.0, 0.0, -3.0]), [0.0, 0.0]);
+        for (direction, [u, v]) in [
+            ([1.0, 0.0, 0.0], [0.0, 0.5]),
+            ([0.0, 2.0, 0.0], [0.25, 0.5]),
+            ([0.0, -1.0, 0.0], [0.75, 0.5]),
+            ([0.0, 0.0, -3.0], [0.0, 0.0]),
+        ] {
+            let found = uv_of_direction(direction);
+            assert!((found[0] - u).abs() < 1e-15 && (found[1] - v).abs() < 1e-15, "{direction:?}: {found:?}");
+        }
     }
 }
