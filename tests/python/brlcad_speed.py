@@ -5,8 +5,8 @@ Usage: brlcad_speed.py --program target/release/lanecast --data FOLDER [--repeat
 FOLDER holds db/NAME.asc, views/NAME.rt and ref/NAME.pix. Pictures of 512x512 pixels are compared first: each case must
 show what the scalar engine shows, byte by byte, and the f64 pictures the references', where there are any; f32 is compared with
 f64. Fewer than 99.9 % of bytes within one level is no result: such a row says so, and is left out of the mean. Then the views
-and precisions are rendered in turns, one thread, all rays counted as `rt` counts them. `rt`'s rates are million rays per second of processor time of BRL-CAD 7.32.6 on
-the same machine, all rays, the lowest and the highest that were measured; a ratio is over the middle of the two.
+and precisions are rendered in turns, one thread, all rays counted as `rt` counts them. `rt`'s rates are million rays per second of processor time of BRL-CAD 7.32.6,
+all rays, the lowest and the highest that were measured, on a Xeon with AVX-512 (family 6, model 207) and not here; a ratio is over the middle of the two.
 """
 
 import argparse
