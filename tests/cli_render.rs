@@ -106,3 +106,24 @@ fn refusals_say_what_is_expected() {
     }
     assert_eq!(files(dir.path()), ["square.ply"]);
 }
+
+/// Nothing to look at is no error: whatever is shown, the picture is that of rays that miss.
+#[test]
+fn scenes_without_anything_are_pictures() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let header = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\n";
+    let faces = "element face 0\nproperty list uchar int vertex_indices\nend_header\n";
+    let database = "title {t}\nunits mm\nput r.r comb region yes tree {}\n";
+    std::fs::write(dir.path().join("empty.ply"), format!("{header}{faces}")).expect("a mesh");
+    std::fs::write(dir.path().join("empty.asc"), database).expect("a database");
+    for integrator in ["whitted", "path", "ao", "normals", "depth"] {
+        run(&dir, &format!("render empty.ply -o {integrator}.exr --size 40x30 --integrator {integrator}"));
+        let film = exr::read(&dir.path().join(format!("{integrator}.exr"))).expect("an EXR file");
+        // Paths see the sky, which is opaque.
+        let alpha = f32::from(u8::from(integrator == "path"));
+        assert!(film.f32_plane("A").expect("A").iter().all(|&a| a == alpha), "{integrator}");
+    }
+    run(&dir, "render empty.asc -o empty.pix --size 40x30 --rt-compat");
+    let bytes = std::fs::read(dir.path().join("empty.pix")).expect("a picture");
+    assert!(bytes.len() == 40 * 30 * 3 && bytes.chunks_exact(3).all(|pixel| pixel == [0, 0, 1]));
+}

@@ -172,7 +172,7 @@ impl<'a, S: Real> Shader<'a, S> {
     /// The same with the lighting model of [`Integrator::Rt`], seen by `camera`: of use for BRL-CAD databases only.
     #[must_use]
     pub fn with_rt(mut self, description: &Description, camera: &Camera) -> Self {
-        let object = &self.world.assembly.objects[0];
+        let object = self.world.assembly.objects.first();
         self.rt = description.looks.as_ref().map(|looks| Rt::new(looks, object, camera));
         self
     }

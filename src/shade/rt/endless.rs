@@ -29,10 +29,10 @@ enum Reach {
 
 impl Endless {
     /// Of the regions that look like `looks`, which are the parts of `object`.
-    pub fn new(looks: &Looks, object: &AssemblyObject) -> Self {
+    pub fn new(looks: &Looks, object: Option<&AssemblyObject>) -> Self {
         let regions: Vec<bool> = looks.regions.iter().map(|look| look.bounds.is_none()).collect();
         let endless = regions.iter().enumerate().filter(|(_, is_endless)| **is_endless);
-        let normals: Option<Vec<Vec<DVec3>>> = endless.map(|(region, _)| normals(object, region)).collect();
+        let normals: Option<Vec<Vec<DVec3>>> = endless.map(|(region, _)| normals(object?, region)).collect();
         let reach = normals.map_or(Reach::Everywhere, |normals| Reach::Below(normals.concat()));
         Self { regions, reach }
     }

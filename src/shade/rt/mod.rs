@@ -126,9 +126,9 @@ pub(super) struct Memory<S> {
 }
 
 impl Rt {
-    /// Regions that look like `looks`, the parts of `object`, lit by their own lights, or by one over the viewer's left
-    /// shoulder.
-    pub fn new(looks: &Looks, object: &AssemblyObject, camera: &Camera) -> Self {
+    /// Regions that look like `looks`, the parts of `object` (`None`: there is nothing), lit by their own lights, or by one
+    /// over the viewer's left shoulder.
+    pub fn new(looks: &Looks, object: Option<&AssemblyObject>, camera: &Camera) -> Self {
         let materials: Vec<RtMaterial> = looks.regions.iter().map(RtMaterial::of).collect();
         let surroundings = looks.surroundings.as_ref().and_then(|shader| Pattern::of(shader.layers.first()?));
         let endless = Endless::new(looks, object);
