@@ -88,6 +88,35 @@ fn there_are_no_other_figures() {
     assert_eq!(speeds("--size 1024x576, 18 million primitives"), Vec::<String>::new());
 }
 
+/// Files of rows and facts below `folder`.
+fn records(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let (folders, files): (Vec<_>, Vec<_>) = entries.partition(|path| path.is_dir());
+    let kept = files.into_iter().filter(|path| path.extension().is_some_and(|e| e == "csv" || e == "txt"));
+    kept.chain(folders.iter().flat_map(|folder| records(folder))).collect()
+}
+
+/// Recorded commands are anyone's: no paths of the machine they ran on.
+#[test]
+fn records_hold_no_paths_of_a_machine() {
+    let Some(results) = results() else { return };
+    let records = records(&results);
+    assert!(records.len() > 100, "{} files", records.len());
+    let strange = |text: &str| {
+        let commands = text.lines().filter_map(|line| line.strip_prefix("command: "));
+        let known = ["lanecast ", "target/release/lanecast "];
+        let by_another = commands.clone().any(|command| !known.iter().any(|name| command.starts_with(name)));
+        let mut words = text.split(|c: char| c.is_whitespace() || "=,;:\"'".contains(c));
+        by_another || words.any(|word| word.len() > 1 && word.starts_with('/'))
+    };
+    for path in records {
+        let text = std::fs::read_to_string(&path).expect("text");
+        assert!(!strange(&text), "{} holds a path of a machine", path.display());
+    }
+    assert!(strange("command: /opt/lanecast bench") && strange("1,lanecast bench -o /tmp/x,2"));
+    assert!(!strange("command: lanecast bench ../x.ply -o results/x\n5.0 Mrays / s, 3 / 4\n"));
+}
+
 /// Two scenes of hand-made rows: the newest whole run counts, rates are rounded, the ratio is of the same rounds.
 #[test]
 fn a_block_is_made_from_the_newest_run_that_has_all() {

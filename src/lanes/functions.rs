@@ -7,6 +7,33 @@ use super::{Lanes, Real};
 /// Largest argument of [`arctangent`]: the tangent of pi / 8.
 const TAN_PI_8: f64 = 0.414_213_562_373_095_03;
 
+/// Taylor's terms of sin(sqrt x) / sqrt x.
+const SINE: [f64; 10] = [
+    1.0,
+    -1.0 / 6.0,
+    1.0 / 120.0,
+    -1.0 / 5040.0,
+    1.0 / 362_880.0,
+    -1.0 / 39_916_800.0,
+    1.0 / 6_227_020_800.0,
+    -1.0 / 1_307_674_368_000.0,
+    1.0 / 355_687_428_096_000.0,
+    -1.0 / 121_645_100_408_832_000.0,
+];
+
+/// Taylor's terms of cos(sqrt x).
+const COSINE: [f64; 9] = [
+    1.0,
+    -0.5,
+    1.0 / 24.0,
+    -1.0 / 720.0,
+    1.0 / 40_320.0,
+    -1.0 / 3_628_800.0,
+    1.0 / 479_001_600.0,
+    -1.0 / 87_178_291_200.0,
+    1.0 / 20_922_789_888_000.0,
+];
+
 /// The nearest whole number, the even one of two; of numbers up to 2^51 (`f64`) or 2^22 (`f32`) in absolute value.
 #[inline(always)]
 pub fn round<V: Lanes>(x: V) -> V {
@@ -31,19 +58,15 @@ pub fn sine_of_turns<V: Lanes>(x: V) -> V {
     let other_side = V::select(turn.cmp_lt(zero), -half, half) - turn;
     let angle = V::select(quarter.cmp_lt(turn.abs()), other_side, turn) * V::constant(TAU);
     let square = angle * angle;
-    let terms = [
-        1.0,
-        -1.0 / 6.0,
-        1.0 / 120.0,
-        -1.0 / 5040.0,
-        1.0 / 362_880.0,
-        -1.0 / 39_916_800.0,
-        1.0 / 6_227_020_800.0,
-        -1.0 / 1_307_674_368_000.0,
-        1.0 / 355_687_428_096_000.0,
-        -1.0 / 121_645_100_408_832_000.0,
-    ];
-    polynomial(square, terms) * angle
+    polynomial(square, &SINE) * angle
+}
+
+/// Sine and cosine of angles up to pi / 4 in absolute value: Taylor polynomials whose first omitted term is below
+/// 2^-52 there.
+#[inline(always)]
+pub fn sin_cos_eighth<V: Lanes>(x: V) -> (V, V) {
+    let square = x * x;
+    (polynomial(square, &SINE[..8]) * x, polynomial(square, &COSINE))
 }
 
 /// The angle of the point (`x`, `y`) from the x axis, -pi to pi; 0 at the origin. `|x| + |y|` must not overflow. Good to
@@ -83,17 +106,13 @@ fn arctangent<V: Lanes>(x: V) -> V {
         0.037_965_243_910_971_95,
         -0.017_805_382_196_606_493,
     ];
-    polynomial(x * x, terms) * x
+    polynomial(x * x, &terms) * x
 }
 
 /// The sum of `terms[k] * x^k`.
 #[inline(always)]
-fn polynomial<V: Lanes, const K: usize>(x: V, terms: [f64; K]) -> V {
-    let mut sum = V::constant(terms[K - 1]);
-    for &term in terms[..K - 1].iter().rev() {
-        sum = sum.mul_add(x, V::constant(term));
-    }
-    sum
+fn polynomial<V: Lanes>(x: V, terms: &[f64]) -> V {
+    terms.iter().rev().fold(V::constant(0.0), |sum, &term| sum.mul_add(x, V::constant(term)))
 }
 
 #[cfg(test)]
@@ -119,6 +138,15 @@ mod tests {
             let exact = ((x - x.round()) * TAU).sin();
             assert!((sine_of_turns(x) - exact).abs() < 1e-15, "{x}");
             assert!((f64::from(sine_of_turns(x as f32)) - exact).abs() < 2e-6, "{x}");
+        }
+    }
+
+    #[test]
+    fn sines_and_cosines() {
+        for k in -100..=100 {
+            let x = f64::from(k) / 100.0 * FRAC_PI_4;
+            let (sin, cos) = sin_cos_eighth(x);
+            assert!((sin - x.sin()).abs() < 4e-16 && (cos - x.cos()).abs() < 4e-16, "{x}");
         }
     }
 

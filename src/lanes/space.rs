@@ -1,4 +1,4 @@
-//! Vectors of space, and the few functions of sampling, over lanes.
+//! Vectors of space over lanes.
 
 use super::{Lanes, Lanes3, dot, map3};
 
@@ -44,37 +44,6 @@ pub fn normalize<V: Lanes>(a: Lanes3<V>) -> Lanes3<V> {
     scale(a, V::constant(1.0) / dot(a, a).sqrt())
 }
 
-/// Sine and cosine of angles up to pi / 4 in absolute value: Taylor polynomials whose first omitted term is below
-/// 2^-52 there.
-#[inline(always)]
-pub fn sin_cos_eighth<V: Lanes>(x: V) -> (V, V) {
-    let y = x * x;
-    let horner =
-        |terms: &[f64]| terms.iter().rev().fold(V::constant(0.0), |sum, &term| sum.mul_add(y, V::constant(term)));
-    let sin = horner(&[
-        1.0,
-        -1.0 / 6.0,
-        1.0 / 120.0,
-        -1.0 / 5040.0,
-        1.0 / 362_880.0,
-        -1.0 / 39_916_800.0,
-        1.0 / 6_227_020_800.0,
-        -1.0 / 1_307_674_368_000.0,
-    ]);
-    let cos = horner(&[
-        1.0,
-        -0.5,
-        1.0 / 24.0,
-        -1.0 / 720.0,
-        1.0 / 40_320.0,
-        -1.0 / 3_628_800.0,
-        1.0 / 479_001_600.0,
-        -1.0 / 87_178_291_200.0,
-        1.0 / 20_922_789_888_000.0,
-    ]);
-    (sin * x, cos)
-}
-
 /// An orthonormal frame around a unit normal: local z is the normal.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<V> {
@@ -118,15 +87,6 @@ impl<V: Lanes> Frame<V> {
 mod tests {
     use super::*;
     use crate::lanes::f64x4;
-
-    #[test]
-    fn sines_and_cosines() {
-        for k in -100..=100 {
-            let x = f64::from(k) / 100.0 * std::f64::consts::FRAC_PI_4;
-            let (sin, cos) = sin_cos_eighth(x);
-            assert!((sin - x.sin()).abs() < 4e-16 && (cos - x.cos()).abs() < 4e-16, "{x}");
-        }
-    }
 
     #[test]
     fn frames_are_orthonormal_and_invert() {

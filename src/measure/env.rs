@@ -1,6 +1,8 @@
 //! What a figure was measured with: revision, compiler, instruction set, machine and its load.
 
+use std::ffi::OsString;
 use std::fmt::Write as _;
+use std::path::Path;
 
 use crate::lanes::compiled_isa;
 use crate::measure::explain::Ports;
@@ -61,10 +63,16 @@ fn date_text(seconds: u64) -> String {
     format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
 }
 
-/// The command line of this process as a shell would take it.
+/// The command line of this process as a shell would take it, of the program no more than its name.
 pub fn command_line() -> String {
-    let words = std::env::args_os().map(|word| {
-        let word = word.to_string_lossy();
+    quoted(std::env::args_os())
+}
+
+/// The words of a command line, quoted where a shell needs it; the first without its folder.
+fn quoted(words: impl Iterator<Item = OsString>) -> String {
+    let words = words.enumerate().map(|(k, word)| {
+        let name = Path::new(&word).file_name().filter(|_| k == 0).unwrap_or(&word);
+        let word = name.to_string_lossy();
         let plain = !word.is_empty() && word.chars().all(|c| c.is_alphanumeric() || "-_./:=,+@%".contains(c));
         if plain { word.into_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
     });
@@ -124,6 +132,13 @@ mod tests {
         assert_eq!(date_text(951_868_799), "2000-02-29T23:59:59Z");
         assert_eq!(date_text(1_735_689_599), "2024-12-31T23:59:59Z");
         assert_eq!(date_text(4_107_542_400), "2100-03-01T00:00:00Z");
+    }
+
+    #[test]
+    fn commands_are_quoted_and_name_no_folder_of_the_program() {
+        let words = ["../bin/lanecast", "bench", "a b", "it's", "", "../scenes/x.ply"];
+        let line = quoted(words.iter().map(OsString::from));
+        assert_eq!(line, r"lanecast bench 'a b' 'it'\''s' '' ../scenes/x.ply");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Shapes against closed forms and against a root finder that shares nothing with the kernels.
 
 mod exact;
+mod normals;
 mod placement;
 mod random;
 mod triangles;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_4};
 
-use crate::lanes::space::sin_cos_eighth;
+use crate::lanes::functions::sin_cos_eighth;
 use crate::lanes::{Lanes, Lanes3};
 
 /// A uniform point of the unit disc: squares around the centre become circles.
