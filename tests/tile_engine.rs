@@ -13,7 +13,7 @@ use lanecast::scene::mesh::Mesh;
 use lanecast::scene::world::{Preset, World};
 use lanecast::scene::{ply, unpack};
 use lanecast::trace::Scratch;
-use tile_support::{Scene, camera, compile, differences, find, shadows};
+use tile_support::{Scene, camera, compile, differences, find, mirrored, shadows};
 
 fn worlds() -> Vec<(&'static str, Scene)> {
     let mut r = Random(77);
@@ -195,6 +195,71 @@ fn ends_exactly_at_a_hit() {
             }
         }
         assert_eq!(differences(&world, &rays), (0, 0));
+    }
+}
+
+/// The cube [-1, 1]^3.
+fn cube() -> Mesh {
+    let corner = |i: u32| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * 2.0 - 1.0;
+    let mut mesh = Mesh { positions: (0..8).map(corner).collect(), ..Mesh::default() };
+    for axis in 0..3 {
+        let [one, other] = [1u32, 2].map(|k| 1 << ((axis + k) % 3));
+        for from in [0, 1 << axis] {
+            let [a, b, c, d] = [from, from | one, from | other, from | one | other];
+            mesh.triangles.extend([[a, b, d], [a, d, c]]);
+        }
+    }
+    mesh
+}
+
+/// Rooms whose walls are mirrors, with things in them that are not flat: of what a wall throws back most has a common point
+/// behind the wall.
+#[test]
+fn mirror_rays() {
+    let mut r = Random(21);
+    let room = |scale: f64, at: DVec3, things: Vec<Mesh>| {
+        let mut walls = cube();
+        let shear = |p: DVec3| (p * 6.0 + DVec3::new(0.1 * p.y, 0.2 * p.z, 0.0)) * scale + at;
+        walls.positions.iter_mut().for_each(|p| *p = shear(*p));
+        let placed = things.into_iter().map(|mut mesh| {
+            mesh.positions.iter_mut().for_each(|p| *p = *p * scale + at);
+            mesh
+        });
+        compile([walls].into_iter().chain(placed).collect())
+    };
+    let away = DVec3::new(300.0, -700.0, 1000.0);
+    for (name, world) in [
+        ("empty", room(1.0, DVec3::ZERO, vec![])),
+        ("soup", room(1.0, DVec3::ZERO, vec![soup(500, &mut r)])),
+        ("ball and soup far away", room(1.0, away, vec![ball(30, 40), soup(500, &mut r)])),
+        ("small", room(1e-3, DVec3::ZERO, vec![ball(30, 40), soup(2000, &mut r)])),
+    ] {
+        let (lo, hi) = world.bounds().unwrap();
+        let place = |f: DVec3| 0.5 * (lo + hi) + 0.5 * (hi - lo) * f;
+        let mut traced = 0;
+        for case in 0..12 {
+            let eye = place(0.8 * r.in_cube());
+            let primary = camera(eye, place(r.in_cube()), [0.1, 0.5, 1.0][case % 3], 64);
+            let mut rays = mirrored(&world, &primary);
+            for _ in 0..2 {
+                assert_eq!(differences(&world, &rays), (0, 0), "{name} case {case}");
+                traced += rays.live_count();
+                rays = mirrored(&world, &rays);
+            }
+            // Ends, starts and dead rays as they come.
+            let live: Vec<usize> = (0..rays.len()).filter(|&i| rays.is_live(i)).collect();
+            for i in live {
+                match r.bits() % 8 {
+                    0 => rays.kill(i),
+                    1 => rays.t_max[i] = ((hi - lo).length() * r.unit()) as f32,
+                    2 => rays.t_min[i] = (0.1 * (hi - lo).length() * r.unit()) as f32,
+                    _ => {}
+                }
+            }
+            assert_eq!(differences(&world, &rays), (0, 0), "{name} case {case}, cut");
+        }
+        println!("{name}: {traced} mirror rays, all bits equal");
+        assert!(traced > 50_000, "{name}: {traced}");
     }
 }
 

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 use lanecast::measure::answers::Answers;
+use lanecast::measure::raysets::{RayKind, Setting, Starts};
 use lanecast::measure::truth;
 use lanecast::ray::{Hits, Rays};
 use lanecast::reference::Oracle;
@@ -126,4 +127,11 @@ pub fn shadows(world: &World<f32>, rays: &Rays<f32>, light: DVec3, end: f32, t_m
         out.set(i, org.to_array(), dir.as_vec3().to_array(), t_min, end);
     }
     out
+}
+
+/// What the surfaces that `rays` hit throw back, as mirrors.
+pub fn mirrored(world: &World<f32>, rays: &Rays<f32>) -> Rays<f32> {
+    let starts = Starts::trace(world, find("scalar"), std::slice::from_ref(rays));
+    let setting = Setting { light: DVec3::ZERO, diagonal: 1.0, seed: 1 };
+    starts.rays(RayKind::Reflect, &setting).remove(0)
 }

@@ -29,7 +29,7 @@ use crate::scene::world::World;
 use chunk::{Best, Chunk, RAYS};
 
 /// Rays that are sorted together.
-const SOURCE: usize = 4096;
+pub const SOURCE: usize = 4096;
 
 /// Widest range of the slopes of rays that are traced as a packet.
 const SPREAD: f64 = 0.25;

@@ -22,7 +22,7 @@
 
 use super::groups::{Groups, splats};
 use super::place::Place;
-use super::{HALF_ULP, V, select};
+use super::{HALF_ULP, Mask, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, f32x8, map3};
 use crate::shape::Block;
 
@@ -101,9 +101,11 @@ pub struct Planes {
     pub eps: [[f32; BATCH]; 3],
     /// Own answers: from here on an edge function (with what was added to it) is surely positive.
     pub sure: [f32; BATCH],
-    /// Any-hit: the first corner and the normal that points away from the apex, in the axes of the geometry and
-    /// the scale of the frame.
+    /// Rays without a common start: the first corner and the normal that points away from the apex, in the axes of the
+    /// geometry and the scale of the frame.
     pub side: [[f32; BATCH]; 6],
+    /// Rays with a common point behind them: infinite where the direction of `side` is not certain, else 0.
+    pub facing: [f32; BATCH],
     /// Own answers: triangles too small for this arithmetic or seen edge-on, bit by triangle.
     pub wild: u32,
     /// Own answers: triangles whose edges need more digits, bit by triangle.
@@ -201,6 +203,10 @@ impl Batch {
         let faced = |x: V| pick(select(back, -x, x), zero);
         let [x, y, z] = map3(normal, |n| n * rcp);
         let inverse = [pick(x, zero), pick(y, zero), pick(z, V::splat(f32::MAX))];
+        if groups.is_behind {
+            self.set_up_side(groups, planes, back);
+            pick(zero, V::splat(f32::INFINITY)).store(&mut planes.facing);
+        }
         let edges = [cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])];
         let linear = [map3(edges[0], faced), map3(edges[1], faced), map3(edges[2], faced), inverse];
         let most = pick(one + rho, one);
@@ -223,6 +229,15 @@ impl Batch {
         (corner[0], [minus(corner[1], corner[0]), minus(corner[2], corner[0])])
     }
 
+    /// Set-up for segments that start anywhere; `back`: triangles whose normal points to the apex.
+    #[inline(always)]
+    fn set_up_side(&self, groups: &Groups, planes: &mut Planes, back: Mask) {
+        let (corner, sides) = self.sides(groups);
+        let away = map3(cross_accurate(sides[0], sides[1]), |x| select(back, -x, x));
+        let side = corner.into_iter().chain(away);
+        planes.side.iter_mut().zip(side).for_each(|(to, x)| x.store(to));
+    }
+
     /// Set-up for the tile's own answers.
     #[inline(always)]
     fn set_up_own<const ANY: bool>(
@@ -238,10 +253,7 @@ impl Batch {
         let back = volume.cmp_lt(zero);
         let faced = |x: V| select(back, -x, x);
         if ANY {
-            let (corner, sides) = self.sides(groups);
-            let away = map3(cross_accurate(sides[0], sides[1]), faced);
-            let side = corner.into_iter().chain(away);
-            planes.side.iter_mut().zip(side).for_each(|(to, x)| x.store(to));
+            self.set_up_side(groups, planes, back);
         }
         let (edges, eps) = own_edges(groups, p);
         let edges = map3(edges, |e| map3(e, faced));

@@ -18,6 +18,8 @@ pub enum Shared {
     Start,
     /// They pass through it at this parameter, where their segments end or a little after.
     End(At),
+    /// They pass through it before they start.
+    Behind,
 }
 
 /// Parameter of a common end.
@@ -89,16 +91,7 @@ impl<'a> Bundle<'a> {
     /// Looks at `N` sets of rays; `None` if they have no point in common. `any`: a common end will do.
     #[inline(always)]
     pub fn find<const N: usize>(rays: &'a Rays<f32>, first: usize, any: bool) -> Option<Self> {
-        let mut bundle = Self {
-            source: Source::Batch(rays),
-            first,
-            apex: [0.0; 3],
-            slack: 0.0,
-            shared: Shared::Start,
-            len: groups::<N>(rays, first),
-            tame: [0; GROUPS],
-            odd: [0; GROUPS],
-        };
+        let mut bundle = Self::unsorted(rays, first, groups::<N>(rays, first));
         // Most rays without a common point show it within the first group.
         let len = std::mem::replace(&mut bundle.len, 1);
         bundle.sort_lanes(rays, 0);
@@ -108,6 +101,27 @@ impl<'a> Bundle<'a> {
         bundle.len = len;
         bundle.sort_lanes(rays, 1);
         bundle.share(rays, any).then_some(bundle)
+    }
+
+    /// Groups of rays, nothing known of them.
+    pub fn unsorted(rays: &'a Rays<f32>, first: usize, len: usize) -> Self {
+        Self {
+            source: Source::Batch(rays),
+            first,
+            apex: [0.0; 3],
+            slack: 0.0,
+            shared: Shared::Start,
+            len,
+            tame: [0; GROUPS],
+            odd: [0; GROUPS],
+        }
+    }
+
+    /// `N` sets of rays, their lanes sorted into tame and odd ones.
+    pub fn sorted<const N: usize>(rays: &'a Rays<f32>, first: usize) -> Self {
+        let mut bundle = Self::unsorted(rays, first, groups::<N>(rays, first));
+        bundle.sort_lanes(rays, 0);
+        bundle
     }
 
     /// The rays of a pencil, or `None` if they go too far to the side of its axes.
@@ -189,7 +203,7 @@ impl<'a> Bundle<'a> {
     pub fn ways(&self, g: usize) -> Lanes3<V> {
         let at = self.first + g * V::N;
         match (self.source, self.shared) {
-            (Source::Batch(rays), Shared::Start) => load3(&rays.dir, at),
+            (Source::Batch(rays), Shared::Start | Shared::Behind) => load3(&rays.dir, at),
             (Source::Batch(rays), Shared::End(_)) => {
                 let org = load3(&rays.org, at);
                 each(|a| org[a] - V::splat(self.apex[a]))
@@ -208,7 +222,7 @@ impl<'a> Bundle<'a> {
     pub fn way(&self, rays: &Rays<f32>, g: usize, lane: usize) -> [f32; 3] {
         let ray = self.first + g * V::N + lane;
         match self.shared {
-            Shared::Start => rays.dir(ray),
+            Shared::Start | Shared::Behind => rays.dir(ray),
             Shared::End(_) => each(|a| rays.org[a][ray] - self.apex[a]),
         }
     }

@@ -3,13 +3,16 @@
 use super::batch::Planes;
 use super::bundle::Bundle;
 use super::groups::{Groups, NO_SLOT, bounded};
-use super::{Mask, V, select};
+use super::{HALF_ULP, Mask, V, select};
 use crate::lanes::chosen::merge;
 use crate::lanes::words::positions;
-use crate::lanes::{LaneMask, Lanes, each};
+use crate::lanes::{LaneMask, Lanes, dot, each, map3};
 use crate::ray::{Candidate, HitPacket, INVALID_ID, Packet};
 use crate::scene::world::{Object, World};
 use crate::shape::Triangle;
+
+/// Rounding of [`start_beyond`] and of what the common formula makes of the same numbers, relative.
+const START: f32 = 32.0 * HALF_ULP;
 
 /// What the common formula needs: the rays as they came and the triangles as they are stored.
 #[derive(Debug)]
@@ -80,7 +83,7 @@ impl Exact<'_> {
 /// One triangle against the rays of one group: takes certain hits. Returns their lanes, and the lanes where only the
 /// common formula can tell.
 #[inline(always)]
-pub fn certain_pair<const ANY: bool>(
+pub fn certain_pair<const ANY: bool, const BEHIND: bool>(
     groups: &mut Groups,
     planes: &Planes,
     g: usize,
@@ -96,9 +99,14 @@ pub fn certain_pair<const ANY: bool>(
     let edge = value(0).fast_min(value(1)).fast_min(value(2));
     let inv_z = value(3);
     let (hi, lo) = (inv_z * V::splat(planes.most[i]), inv_z * V::splat(planes.least[i]));
-    let possible = V::splat(planes.outside[i]).cmp_le(edge) & inv_lo.cmp_le(hi);
-    let certain =
-        possible & V::splat(planes.inside[i]).cmp_le(edge) & inv_hi.cmp_lt(lo) & hi.cmp_lt(V::splat(groups.cap));
+    let mut possible = V::splat(planes.outside[i]).cmp_le(edge) & inv_lo.cmp_le(hi);
+    let mut ahead = hi.cmp_lt(V::splat(groups.cap));
+    if BEHIND {
+        let (beyond, doubt) = start_beyond(groups, planes, g, i);
+        possible = possible & beyond.cmp_le(doubt);
+        ahead = ahead & beyond.cmp_lt(-doubt);
+    }
+    let certain = possible & V::splat(planes.inside[i]).cmp_le(edge) & inv_hi.cmp_lt(lo) & ahead;
     if ANY {
         groups.of[g].inv_lo = select(certain, V::splat(f32::INFINITY), inv_lo);
         groups.of[g].done |= certain.bits();
@@ -108,6 +116,17 @@ pub fn certain_pair<const ANY: bool>(
         groups.of[g].slot = merge(certain, slot, groups.of[g].slot);
     }
     (certain.bits(), possible.bits() & !certain.bits())
+}
+
+/// How far segments start beyond a triangle's plane as seen from their common point, in some unit, and its rounding error
+/// together with that of the common formula: both are sums of three products with differences of coordinates.
+#[inline(always)]
+fn start_beyond(groups: &Groups, planes: &Planes, g: usize, i: usize) -> (V, V) {
+    let way = each(|a| groups.of[g].start[a] - V::splat(planes.side[a][i]));
+    let normal: [V; 3] = each(|a| V::splat(planes.side[a + 3][i]));
+    let beyond = dot(normal, way);
+    let size = dot(map3(normal, V::abs), map3(way, V::abs));
+    (beyond, size.mul_add(V::splat(START), V::splat(planes.facing[i])))
 }
 
 /// Decides by the common formula whether a triangle is hit by `lanes` of a group, and whether it is nearer than what
@@ -146,8 +165,8 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slo
         });
     }
     // From here on the depth is known as well as the common formula knows it.
-    let inverse = V::constant(1.0) / (t * groups.of[g].speed);
-    let loose = groups.loose();
+    let inverse = V::constant(1.0) / ((t + groups.of[g].behind) * groups.of[g].speed);
+    let loose = groups.loose;
     let mask = Mask::from_bits(wins);
     groups.of[g].inv_lo = select(mask, bounded(inverse) * V::splat(1.0 - loose), groups.of[g].inv_lo);
     groups.of[g].inv_hi = select(mask, inverse * V::splat(1.0 + loose), groups.of[g].inv_hi);

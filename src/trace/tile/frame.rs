@@ -68,13 +68,18 @@ impl Frame {
     #[inline(always)]
     fn mean_direction<const N: usize>(bundle: &Bundle, rays: &Rays<f32>, groups: u64) -> ([f64; 3], [f64; 3]) {
         let mut sample: Lanes3<[f32; SET]> = Default::default();
-        // One group alone is sampled whole, else every `N`th group by its first lane.
+        // One group alone is sampled whole, else one of `N` groups by its first lane.
         let single = groups.is_power_of_two().then(|| groups.trailing_zeros() as usize);
         let mut used = 0;
         for i in 0..SET {
             let (g, lane) = match single {
                 Some(g) => (g, i),
-                None => (N * i, (bundle.tame[N * i].trailing_zeros() as usize).min(V::N - 1)),
+                None => {
+                    // Of the `N` groups here the first that is of the tile.
+                    let here = groups >> (N * i) & ((1 << N) - 1);
+                    let g = N * i + if here == 0 { 0 } else { here.trailing_zeros() as usize };
+                    (g, (bundle.tame[g].trailing_zeros() as usize).min(V::N - 1))
+                }
             };
             if groups >> g & 1 == 0 || bundle.tame[g] >> lane & 1 == 0 {
                 continue;

@@ -11,6 +11,9 @@ use crate::scene::world::World;
 /// Widest tile: |s| and |t| below this (83 degrees off the axis).
 const WIDEST: f32 = 8.0;
 
+/// Largest relative error of depths computed from a ray's parameter.
+const MOST_LOOSE: f32 = 1e-3;
+
 /// "No triangle yet".
 pub const NO_SLOT: u32 = u32::MAX;
 
@@ -31,9 +34,11 @@ pub struct Group {
     pub slot: [u32; 16],
     /// Own answers: edge functions of the best hit, those of the second and third corner and the sum of all.
     pub weights: [V; 3],
-    /// Rays with a common end: where their segments start, in the axes of the geometry and
+    /// Rays without a common start: where their segments start, in the axes of the geometry and
     /// the scale of the frame.
     pub start: Lanes3<V>,
+    /// Rays with a common point behind them: how far, in their parameter; 0 for others.
+    pub behind: V,
     /// Depth per unit of the ray's parameter.
     pub speed: V,
     /// Lanes that found something (any-hit).
@@ -51,6 +56,7 @@ impl Default for Group {
             slot: [NO_SLOT; 16],
             weights: [zero; 3],
             start: [zero; 3],
+            behind: zero,
             speed: zero,
             done: 0,
         }
@@ -69,6 +75,12 @@ pub struct Groups {
     pub inst: [[u32; 16]; GROUPS],
     /// Some segment ends before the common point.
     pub ends_early: bool,
+    /// The common point is behind where segments start.
+    pub is_behind: bool,
+    /// Surely no segment starts nearer than at this depth.
+    pub front: f32,
+    /// Relative error of depths computed from a ray's parameter.
+    pub loose: f32,
     /// Per group, sixteen in the lanes of a vector: least and greatest s, least and greatest t.
     pub rect: [[[V; SETS]; 2]; 2],
     /// The same as fractions of the tile's rectangle.
@@ -101,6 +113,9 @@ impl Default for Groups {
             many: false,
             inst: [[NO_SLOT; 16]; GROUPS],
             ends_early: false,
+            is_behind: false,
+            front: 0.0,
+            loose: 0.0,
             rect: [[zero; 2]; 2],
             part: [[zero; 2]; 2],
             least: zero,
@@ -130,6 +145,8 @@ struct Lines {
     fit: u32,
     /// Distance from the common end (0 for a common start).
     reach: V,
+    /// See [`Group::behind`].
+    behind: V,
 }
 
 impl Groups {
@@ -150,7 +167,7 @@ impl Groups {
             self.inst[..N * SET].fill([NO_SLOT; 16]);
         }
         let most = V::splat(f32::INFINITY);
-        let (mut near, mut reach) = (most, V::splat(0.0));
+        let (mut near, mut reach, mut front) = (most, V::splat(0.0), most);
         for q in 0..N {
             let mut lows = [[most; SET]; 2];
             // Greatest values as least negatives: one kind of shuffle tree does both.
@@ -170,6 +187,7 @@ impl Groups {
                 }
                 let lanes = Mask::from_bits(tame);
                 (self.of[g].s, self.of[g].t, self.of[g].speed) = (lines.s, lines.t, lines.speed);
+                self.of[g].behind = lines.behind;
                 if bundle.shared != Shared::Start {
                     self.of[g].start = map3(bundle.starts(g), |x| x * V::splat(self.frame.scale));
                 }
@@ -179,6 +197,7 @@ impl Groups {
                 highs[1][i] = select(lanes, -lines.t, most);
                 near = select(lanes, lines.near, most).fast_min(near);
                 reach = select(lanes, lines.reach, reach).fast_max(reach);
+                front = select(lanes, lines.behind * lines.speed, front).fast_min(front);
                 self.of[g].inv_lo = select(lanes, bounded(lines.far), most);
                 self.of[g].inv_hi = select(lanes, if EXACT { lines.far } else { lines.near }, most);
             }
@@ -206,6 +225,16 @@ impl Groups {
         }
         self.ends_early = least(near) < f32::INFINITY;
         self.slack = (bundle.slack + 8.0 * HALF_ULP * greatest(reach)) * self.frame.scale;
+        self.is_behind = bundle.shared == Shared::Behind;
+        (self.front, self.loose) = (0.0, 32.0 * HALF_ULP * (1.0 + self.wide));
+        if self.is_behind {
+            let front = least(front);
+            self.loose += 4.0 * self.slack / front;
+            if self.loose.is_nan() || self.loose > MOST_LOOSE {
+                return false;
+            }
+            self.front = front * (1.0 - self.loose);
+        }
         if EXACT || bundle.shared != Shared::Start {
             self.loosen::<N>(near);
         }
@@ -216,7 +245,7 @@ impl Groups {
     /// The ends of the segments, moved apart by what rounding may have done to them.
     #[inline(always)]
     fn loosen<const N: usize>(&mut self, near: V) {
-        let loose = self.loose();
+        let loose = self.loose;
         for g in 0..N * SET {
             self.of[g].inv_lo *= V::splat(1.0 - loose);
             self.of[g].inv_hi *= V::splat(1.0 + loose);
@@ -240,12 +269,6 @@ impl Groups {
         2.0 * square / (depth * depth) * (N * SET * V::N) as f32 / (s * t)
     }
 
-    /// Relative error of depths computed from a ray's parameter.
-    #[inline(always)]
-    pub fn loose(&self) -> f32 {
-        32.0 * HALF_ULP * (1.0 + self.wide)
-    }
-
     #[inline(always)]
     fn lines(&self, bundle: &Bundle, g: usize) -> Lines {
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
@@ -254,7 +277,7 @@ impl Groups {
             let (s, t) = (V::new(s), V::new(t));
             let (speed, near) = (V::splat(self.frame.scale), V::splat(f32::INFINITY));
             let fit = s.abs().cmp_lt(V::splat(WIDEST)) & t.abs().cmp_lt(V::splat(WIDEST));
-            return Lines { s, t, speed, far: zero, near, fit: fit.bits(), reach: zero };
+            return Lines { s, t, speed, far: zero, near, fit: fit.bits(), reach: zero, behind: zero };
         }
         let [t_min, t_max] = bundle.ends(g);
         let direction = bundle.ways(g);
@@ -264,7 +287,14 @@ impl Groups {
         let (widest, most) = (V::splat(WIDEST), V::splat(f32::MAX));
         let mut fit = s.abs().cmp_lt(widest) & t.abs().cmp_lt(widest);
         fit = fit & zero.cmp_lt(speed) & zero.cmp_lt(slowness) & slowness.cmp_lt(most);
+        let mut behind = zero;
         let (far, near, reach) = match bundle.shared {
+            Shared::Behind => {
+                let way = each(|a| bundle.starts(g)[a] - V::splat(bundle.apex[a]));
+                behind = dot(way, direction) / dot(direction, direction);
+                // Where a segment starts is told by the start itself.
+                (slowness / (t_max + behind), V::splat(f32::INFINITY), zero)
+            }
             Shared::Start => (slowness / t_max, slowness / t_min, zero),
             Shared::End(at) => {
                 let scale = match at {
@@ -279,7 +309,7 @@ impl Groups {
                 (slowness / start, slowness / zero.fast_max(end), size)
             }
         };
-        Lines { s, t, speed, far, near, fit: fit.bits(), reach }
+        Lines { s, t, speed, far, near, fit: fit.bits(), reach, behind }
     }
 
     /// The smallest values of some linear functions over the tile's rectangle.

@@ -19,6 +19,7 @@ mod engine;
 mod exact;
 mod frame;
 mod groups;
+mod mirror;
 mod node;
 mod own;
 mod pairs;
@@ -33,7 +34,7 @@ use super::{Generic, Scratch, stream, traverse};
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, HitPacket, Packet, Pencil, Rays};
 use crate::scene::world::{Object, World};
-use bundle::Bundle;
+use bundle::{Bundle, Shared};
 use exact::Exact;
 
 /// A group's rays: the vector of the whole engine.
@@ -82,6 +83,8 @@ pub struct Memory {
     credit: u32,
     /// Where groups start that are for the stream kernel.
     rest: Vec<usize>,
+    /// Single rays that are.
+    left: mirror::Left,
 }
 
 /// The engine; `EXACT`: with the hits of the common formula.
@@ -154,6 +157,7 @@ impl<'a> Job<'a> {
     }
 
     fn run<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self) {
+        let mirrors = !ANY && self.most == GROUPS && suits(self.world, true);
         let suits = suits(self.world, EXACT);
         if suits {
             self.make_levels();
@@ -171,12 +175,21 @@ impl<'a> Job<'a> {
                 self.block::<ANY, EXACT, COUNT>(&bundle);
                 continue;
             }
+            if mirrors && self.mirrored::<COUNT>(first) {
+                if self.memory.left.len() > stream::SOURCE {
+                    self.leftovers::<COUNT>();
+                }
+                continue;
+            }
             for first in (first..self.rays.len().min(first + BLOCK)).step_by(SET * V::N) {
                 match Bundle::find::<1>(self.rays, first, ANY) {
                     Some(bundle) => self.block::<ANY, EXACT, COUNT>(&bundle),
                     None => self.leave::<1>(first),
                 }
             }
+        }
+        if self.memory.left.len() > 0 {
+            self.leftovers::<COUNT>();
         }
         if self.memory.rest.is_empty() {
             return;
@@ -314,7 +327,10 @@ impl<'a> Job<'a> {
             hit = self.rest::<ANY, COUNT>(first, odd, Some(hit)).0;
         }
         if let Output::Closest(hits) = &mut self.output {
-            hit.store(hits, first);
+            match exact.bundle.shared {
+                Shared::Behind => hit.store_lanes(hits, first, exact.bundle.tame[g]),
+                _ => hit.store(hits, first),
+            }
         }
     }
 

@@ -34,6 +34,8 @@ pub struct Planes {
     depth: [f32; 3],
     depth_size: [f32; 3],
     depth_margin: f32,
+    /// Boxes that end before this depth are not met.
+    front: f32,
     apex: [f32; 3],
 }
 
@@ -88,6 +90,7 @@ impl Planes {
             depth: a.map(|x| 0.5 * x),
             depth_size: a.map(|x| (0.5 * x).abs()),
             depth_margin: 0.0,
+            front: groups.front,
             apex: frame.apex,
         };
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
@@ -127,7 +130,7 @@ impl Planes {
         let rz = e[0].mul_add(size[0], e[1].mul_add(size[1], e[2].mul_add(size[2], margin)));
         // Left of the tile's left edge or right of its right edge, all of the box.
         let outside = signs(left.fast_min(below)) & 0xff | signs(right.fast_min(above)) >> 8;
-        let in_front = zero.cmp_le(mz + rz).bits();
+        let in_front = Half::splat(self.front).cmp_le(mz + rz).bits();
         let met = !outside & in_front & ((1u32 << node.used.min(8)) - 1);
         if met == 0 {
             return 0;

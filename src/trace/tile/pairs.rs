@@ -64,7 +64,10 @@ fn test<const ANY: bool, const EXACT: bool, const MANY: bool, const COUNT: bool>
         let (g, i) = (usize::from(pairs.group[k]) & (GROUPS - 1), usize::from(pairs.triangle[k]) & 15);
         let id = Id { inst: batch.inst[i], prim: batch.id[i] };
         if EXACT {
-            let (certain, doubtful) = certain_pair::<ANY>(groups, planes, g, i, batch.id[i]);
+            let (certain, doubtful) = match groups.is_behind {
+                true => certain_pair::<ANY, true>(groups, planes, g, i, batch.id[i]),
+                false => certain_pair::<ANY, false>(groups, planes, g, i, batch.id[i]),
+            };
             found += usize::from(certain | doubtful != 0);
             if doubtful != 0 {
                 exact::decide::<ANY>(groups, exact, g, batch.id[i], doubtful);
