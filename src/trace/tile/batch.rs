@@ -193,14 +193,18 @@ impl Batch {
         let volume = dot(normal, p[0]);
         let rcp = V::constant(1.0) / volume;
         let length = sum(d1).fast_max(sum(d2)).fast_max(sum(minus(d2, d1)));
-        let (eps, rho) = doubt(groups, &p, length, sum(normal), rcp);
+        let Doubt { eps, shift, rho } = doubt(groups, &p, length, sum(normal), rcp);
 
-        // Triangles seen (nearly) edge-on have no side and no depth: met everywhere, certain nowhere.
+        // Triangles seen (nearly) edge-on have no side and no depth: certain nowhere, and met in a strip along the edge that is
+        // seen longest. A point of them has an edge function of the volume over its depth at most.
         let tame = rho.cmp_lt(V::splat(WILD));
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
+        let low = p[0][2].fast_min(p[1][2]).fast_min(p[2][2]);
+        let width = (volume.abs() + shift + shift) / low + eps;
+        let width = select(zero.cmp_lt(low), width, V::splat(f32::INFINITY));
         let back = volume.cmp_lt(zero);
         let pick = |x: V, wild: V| select(tame, x, wild);
-        let faced = |x: V| pick(select(back, -x, x), zero);
+        let faced = |x: V| select(back, -x, x);
         let [x, y, z] = map3(normal, |n| n * rcp);
         let inverse = [pick(x, zero), pick(y, zero), pick(z, V::splat(f32::MAX))];
         if groups.is_behind {
@@ -208,13 +212,20 @@ impl Batch {
             pick(zero, V::splat(f32::INFINITY)).store(&mut planes.facing);
         }
         let edges = [cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])];
-        let linear = [map3(edges[0], faced), map3(edges[1], faced), map3(edges[2], faced), inverse];
+        let strip = longest(&edges);
+        let linear = [
+            each(|a| pick(faced(edges[0][a]), strip[a])),
+            each(|a| pick(faced(edges[1][a]), -strip[a])),
+            each(|a| pick(faced(edges[2][a]), zero)),
+            inverse,
+        ];
         let most = pick(one + rho, one);
-        (-eps).store(&mut planes.outside);
+        let width = pick(eps, width);
+        (-width).store(&mut planes.outside);
         pick(eps, V::splat(f32::INFINITY)).store(&mut planes.inside);
         most.store(&mut planes.most);
         pick(one - rho, zero).store(&mut planes.least);
-        planes.store(groups, &linear, eps, |inverse| inverse * most) & ((1u32 << self.len) - 1)
+        planes.store(groups, &linear, width, |inverse| inverse * most) & ((1u32 << self.len) - 1)
     }
 
     /// The first corner and the two sides that leave it, in the world and the scale of the frame.
@@ -313,10 +324,19 @@ impl Planes {
     }
 }
 
-/// How far edge functions (absolute) and 1/z (relative) may be from those of the common formula. `length` is the
-/// longest side, `area` the size of the normal, `rcp` the reciprocal of normal times corner.
+/// How far numbers may be from those of the common formula.
+struct Doubt {
+    /// Edge functions, absolute.
+    eps: V,
+    /// Normal times corner, absolute.
+    shift: V,
+    /// 1/z, relative.
+    rho: V,
+}
+
+/// `length` is the longest side, `area` the size of the normal, `rcp` the reciprocal of normal times corner.
 #[inline(always)]
-fn doubt(groups: &Groups, p: &[Lanes3<V>; 3], length: V, area: V, rcp: V) -> (V, V) {
+fn doubt(groups: &Groups, p: &[Lanes3<V>; 3], length: V, area: V, rcp: V) -> Doubt {
     let largest = |f: &dyn Fn(Lanes3<V>) -> V| f(p[0]).fast_max(f(p[1])).fast_max(f(p[2]));
     let distance = largest(&sum);
     let moved = distance.mul_add(V::splat(MOVED * HALF_ULP), V::splat(groups.slack));
@@ -327,7 +347,16 @@ fn doubt(groups: &Groups, p: &[Lanes3<V>; 3], length: V, area: V, rcp: V) -> (V,
     // Corners that move by `moved` move the plane no farther; 8 half ulps for the products of either formula, which
     // are as large as the sides, and for the dot products.
     let shift = area * products.mul_add(distance, moved) + products * length * length * length;
-    (eps, (shift * rcp.abs()).mul_add(V::splat(slant), V::splat(MOVED * HALF_ULP)))
+    let rho = (shift * rcp.abs()).mul_add(V::splat(slant), V::splat(MOVED * HALF_ULP));
+    Doubt { eps, shift, rho }
+}
+
+/// The edge function of the edge that is seen longest: its slope is the largest.
+#[inline(always)]
+fn longest(edges: &[Lanes3<V>; 3]) -> Lanes3<V> {
+    let [a, b, c] = map3(*edges, |e| e[0].abs() + e[1].abs());
+    let (first, most) = (b.cmp_lt(a), a.fast_max(b));
+    each(|x| select(c.cmp_lt(most), select(first, edges[0][x], edges[1][x]), edges[2][x]))
 }
 
 /// Rounding error of an edge function of the common formula, for the corners as they are.

@@ -21,16 +21,16 @@ const CLOSE: f32 = 32.0;
 const FIRST: f32 = 512.0;
 
 /// Fewest rays worth a tile of their own.
-const LEAST: u32 = 64;
+const LEAST: u32 = 32;
 
 /// Rays of a group that must be free and pass a point for it to be tried.
 const MOSTLY: u32 = 12;
 
-/// Points that may turn out to be none before a block is left to others.
+/// Points in a row that may turn out to be none before the rest of a block is left to others.
 const FAILURES: u32 = 4;
 
-/// Rays a point is made from.
-const SAMPLE: usize = 16;
+/// Most rays a point is made from.
+const SAMPLE: usize = V::N;
 
 /// Rays that are left over, traced as a batch of their own.
 #[derive(Debug, Default)]
@@ -67,6 +67,7 @@ impl<'a> Search<'a> {
             match self.around(g) {
                 Some(bundle) => {
                     (0..self.len).for_each(|g| self.free[g] &= !bundle.tame[g]);
+                    self.failures = 0;
                     return Some(bundle);
                 }
                 None => self.failures += 1,
@@ -77,19 +78,24 @@ impl<'a> Search<'a> {
 
     /// The point that most rays of group `g` pass, and all that pass it.
     fn around(&self, g: usize) -> Option<Bundle<'a>> {
-        let mut sample = [0; SAMPLE];
-        let lanes = (0..V::N).filter(|lane| self.free[g] >> lane & 1 != 0);
-        let mut n = 0;
-        for (to, lane) in sample.iter_mut().zip(lanes) {
-            (*to, n) = (self.first + g * V::N + lane, n + 1);
+        let first = self.first + g * V::N;
+        let (mut sample, mut n) = ([0; SAMPLE], 0);
+        for lane in (0..V::N).filter(|lane| self.free[g] >> lane & 1 != 0) {
+            (sample[n], n) = (first + lane, n + 1);
         }
-        let mut apex = meeting_point(self.rays, &sample[..n])?;
+        let apex = meeting_point(self.rays, &sample[..n])?;
         if self.passing(g, apex, CLOSE).0.count_ones() < MOSTLY {
             return None;
         }
-        for _ in 0..2 {
-            apex = meeting_point(self.rays, &self.spread(apex)?)?;
+        // Made anew from rays all over the block: those of one group are nearly parallel.
+        for (i, ray) in sample[..n].iter_mut().enumerate() {
+            let other = i * self.len / n;
+            let lanes = self.passing(other, apex, FIRST).0;
+            if lanes != 0 {
+                *ray = self.first + other * V::N + lanes.trailing_zeros() as usize;
+            }
         }
+        let apex = meeting_point(self.rays, &sample[..n])?;
         let (mut tame, mut slack, mut count) = ([0; GROUPS], V::constant(0.0), 0);
         for g in 0..self.len {
             let (lanes, miss) = self.passing(g, apex, CLOSE);
@@ -97,25 +103,6 @@ impl<'a> Search<'a> {
         }
         let slack = slack.to_array().into_iter().fold(0.0, f32::max);
         (count >= LEAST).then(|| Bundle::behind(self.rays, self.first, self.len, apex, slack, tame))
-    }
-
-    /// Rays that pass `apex` about closely, from all over the block.
-    fn spread(&self, apex: [f32; 3]) -> Option<[usize; SAMPLE]> {
-        let (mut passing, mut groups) = ([0; GROUPS], 0);
-        for g in 0..self.len {
-            passing[groups] = self.passing(g, apex, FIRST).0 as u64 | (g as u64) << 32;
-            groups += usize::from(passing[groups] as u32 != 0);
-        }
-        let mut sample = [0; SAMPLE];
-        for (i, ray) in sample.iter_mut().enumerate() {
-            let found = passing.get(i * groups / SAMPLE).filter(|_| groups > 0)?;
-            let (lanes, g) = (*found as u32, (found >> 32) as usize);
-            // Of a few groups more than one ray: not the same one.
-            let skipped = (i % lanes.count_ones() as usize).min(V::N);
-            let rest = (0..skipped).fold(lanes, |rest, _| rest & (rest - 1));
-            *ray = self.first + g * V::N + rest.trailing_zeros() as usize;
-        }
-        Some(sample)
     }
 
     /// Free rays of a group whose lines pass `apex` behind their starts, at `close` half ulps; and how far at most.
@@ -165,7 +152,8 @@ impl Job<'_> {
         let all = Bundle::sorted::<SETS>(self.rays, first);
         let mut free = all.tame;
         for (g, free) in free.iter_mut().enumerate().take(all.len) {
-            *free &= V::load(&self.rays.t_min[first + g * V::N..]).cmp_eq(V::constant(0.0)).bits();
+            let at = first + g * V::N;
+            *free &= V::load(&self.rays.t_min[at..]).cmp_eq(V::constant(0.0)).bits();
         }
         let mut search = Search { rays: self.rays, first, len: all.len, free, next: 0, failures: 0 };
         let mut done = [0; GROUPS];
