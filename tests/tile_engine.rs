@@ -236,7 +236,7 @@ fn mirror_rays() {
     ] {
         let (lo, hi) = world.bounds().unwrap();
         let place = |f: DVec3| 0.5 * (lo + hi) + 0.5 * (hi - lo) * f;
-        let mut traced = 0;
+        let (mut traced, mut counters) = (0, Counters::default());
         for case in 0..12 {
             let eye = place(0.8 * r.in_cube());
             let primary = camera(eye, place(r.in_cube()), [0.1, 0.5, 1.0][case % 3], 64);
@@ -244,6 +244,8 @@ fn mirror_rays() {
             for _ in 0..2 {
                 assert_eq!(differences(&world, &rays), (0, 0), "{name} case {case}");
                 traced += rays.live_count();
+                let scratch = &mut Scratch::default();
+                find("tile").intersect(&world, &rays, &mut Hits::default(), scratch, Some(&mut counters));
                 rays = mirrored(&world, &rays);
             }
             // Ends, starts and dead rays as they come.
@@ -258,8 +260,11 @@ fn mirror_rays() {
             }
             assert_eq!(differences(&world, &rays), (0, 0), "{name} case {case}, cut");
         }
-        println!("{name}: {traced} mirror rays, all bits equal");
+        // Only tiles count these.
+        let share = counters.prim_lanes_linear as f64 / counters.prim_lanes_total as f64;
+        println!("{name}: {traced} mirror rays, all bits equal; {share:.2} of the triangle tests in tiles");
         assert!(traced > 50_000, "{name}: {traced}");
+        assert!(share > 0.2, "{name}: {share}");
     }
 }
 

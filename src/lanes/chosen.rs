@@ -35,8 +35,14 @@ pub fn positions_in<V: Lanes>(list: &[u32], wanted: u32) -> u32 {
 /// A list with `new` where the mask is set. Numbers are moved as floats: selection copies bits.
 #[inline(always)]
 pub fn merge(mask: <f32x16 as Lanes>::Mask, new: u32, old: [u32; MAX_LANES]) -> [u32; MAX_LANES] {
-    let old = f32x16::new(bytemuck::cast(old));
-    bytemuck::cast(<f32x16 as Lanes>::select(mask, f32x16::splat(f32::from_bits(new)), old).to_array())
+    merge_lists(mask, [new; MAX_LANES], old)
+}
+
+/// A list with the numbers of `new` where the mask is set.
+#[inline(always)]
+pub fn merge_lists(mask: <f32x16 as Lanes>::Mask, new: [u32; MAX_LANES], old: [u32; MAX_LANES]) -> [u32; MAX_LANES] {
+    let [new, old] = [new, old].map(|list| f32x16::new(bytemuck::cast(list)));
+    bytemuck::cast(<f32x16 as Lanes>::select(mask, new, old).to_array())
 }
 
 /// Three vectors in memory, to be read lane by lane with [`at`].

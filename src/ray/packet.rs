@@ -194,18 +194,4 @@ impl<V: Lanes> HitPacket<V> {
         hits.prim[first..first + V::N].copy_from_slice(&self.prim[..V::N]);
         hits.inst[first..first + V::N].copy_from_slice(&self.inst[..V::N]);
     }
-
-    /// The same of some `lanes`; what is there of the others stays.
-    #[inline(always)]
-    pub fn store_lanes(&self, hits: &mut Hits<V::Scalar>, first: usize, lanes: u32) {
-        if lanes & V::ALL == V::ALL {
-            return self.store(hits, first);
-        }
-        for lane in (0..V::N).filter(|lane| lanes >> lane & 1 != 0) {
-            let is_hit = self.prim[lane] != INVALID_ID;
-            hits.t[first + lane] = if is_hit { self.t.lane(lane) } else { V::Scalar::INFINITY };
-            (hits.u[first + lane], hits.v[first + lane]) = (self.u.lane(lane), self.v.lane(lane));
-            (hits.prim[first + lane], hits.inst[first + lane]) = (self.prim[lane], self.inst[lane]);
-        }
-    }
 }

@@ -22,7 +22,7 @@
 
 use super::groups::{Groups, splats};
 use super::place::Place;
-use super::{HALF_ULP, Mask, V, select};
+use super::{HALF_ULP, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, f32x8, map3};
 use crate::shape::Block;
 
@@ -106,6 +106,8 @@ pub struct Planes {
     pub side: [[f32; BATCH]; 6],
     /// Rays with a common point behind them: infinite where the direction of `side` is not certain, else 0.
     pub facing: [f32; BATCH],
+    /// Own answers: the reciprocal of the distance between the apex and the plane, in the unit of the normal in `side`.
+    pub rcp: [f32; BATCH],
     /// Own answers: triangles too small for this arithmetic or seen edge-on, bit by triangle.
     pub wild: u32,
     /// Own answers: triangles whose edges need more digits, bit by triangle.
@@ -208,7 +210,7 @@ impl Batch {
         let [x, y, z] = map3(normal, |n| n * rcp);
         let inverse = [pick(x, zero), pick(y, zero), pick(z, V::splat(f32::MAX))];
         if groups.is_behind {
-            self.set_up_side(groups, planes, back);
+            self.set_up_side(groups, planes);
             pick(zero, V::splat(f32::INFINITY)).store(&mut planes.facing);
         }
         let edges = [cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])];
@@ -240,13 +242,18 @@ impl Batch {
         (corner[0], [minus(corner[1], corner[0]), minus(corner[2], corner[0])])
     }
 
-    /// Set-up for segments that start anywhere; `back`: triangles whose normal points to the apex.
+    /// Set-up for segments that start anywhere. Not from the corners in the frame: theirs is another normal, if the triangle
+    /// is a needle.
     #[inline(always)]
-    fn set_up_side(&self, groups: &Groups, planes: &mut Planes, back: Mask) {
+    fn set_up_side(&self, groups: &Groups, planes: &mut Planes) {
         let (corner, sides) = self.sides(groups);
-        let away = map3(cross_accurate(sides[0], sides[1]), |x| select(back, -x, x));
-        let side = corner.into_iter().chain(away);
+        let normal = cross_accurate(sides[0], sides[1]);
+        let from_apex = each(|a| corner[a] - V::splat(groups.frame.apex[a] * groups.frame.scale));
+        let volume = dot(normal, from_apex);
+        let back = volume.cmp_lt(V::constant(0.0));
+        let side = corner.into_iter().chain(map3(normal, |x| select(back, -x, x)));
         planes.side.iter_mut().zip(side).for_each(|(to, x)| x.store(to));
+        (V::constant(1.0) / volume.abs()).store(&mut planes.rcp);
     }
 
     /// Set-up for the tile's own answers.
@@ -263,8 +270,8 @@ impl Batch {
         let rcp = one / volume;
         let back = volume.cmp_lt(zero);
         let faced = |x: V| select(back, -x, x);
-        if ANY {
-            self.set_up_side(groups, planes, back);
+        if ANY || groups.is_behind {
+            self.set_up_side(groups, planes);
         }
         let (edges, eps) = own_edges(groups, p);
         let edges = map3(edges, |e| map3(e, faced));

@@ -117,13 +117,6 @@ impl<'a> Bundle<'a> {
         }
     }
 
-    /// `N` sets of rays, their lanes sorted into tame and odd ones.
-    pub fn sorted<const N: usize>(rays: &'a Rays<f32>, first: usize) -> Self {
-        let mut bundle = Self::unsorted(rays, first, groups::<N>(rays, first));
-        bundle.sort_lanes(rays, 0);
-        bundle
-    }
-
     /// The rays of a pencil, or `None` if they go too far to the side of its axes.
     pub fn of_pencil(pencil: &'a Pencil) -> Option<Self> {
         let len = pencil.live.len();
@@ -239,23 +232,26 @@ impl<'a> Bundle<'a> {
 
     #[inline(always)]
     fn sort_lanes(&mut self, rays: &Rays<f32>, from: usize) {
+        for g in from..self.len {
+            prefetch_rays(rays, self.first + (g + AHEAD) * V::N);
+            self.sort_group(rays, g);
+        }
+    }
+
+    /// Tells the tame and odd lanes of a group.
+    #[inline(always)]
+    pub fn sort_group(&mut self, rays: &Rays<f32>, g: usize) {
         let (least, most) = (V::splat(TAME.0), V::splat(TAME.1));
         let size = |v: Lanes3<V>| v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs());
         let finite = |v: Lanes3<V>| v[0].abs().cmp_le(most) & v[1].abs().cmp_le(most) & v[2].abs().cmp_le(most);
-        for g in from..self.len {
-            let at = self.first + g * V::N;
-            prefetch_rays(rays, at + AHEAD * V::N);
-            let (org, dir) = (load3(&rays.org, at), load3(&rays.dir, at));
-            let (t_min, t_max) = (V::load(&rays.t_min[at..]), V::load(&rays.t_max[at..]));
-            let tame = finite(org)
-                & finite(dir)
-                & least.cmp_le(size(dir))
-                & V::constant(0.0).cmp_le(t_min)
-                & t_min.cmp_le(t_max);
-            self.tame[g] = tame.bits();
-            if self.tame[g] != V::ALL {
-                self.odd[g] = Packet::<V>::load(rays, at).2 & !self.tame[g];
-            }
+        let at = self.first + g * V::N;
+        let (org, dir) = (load3(&rays.org, at), load3(&rays.dir, at));
+        let (t_min, t_max) = (V::load(&rays.t_min[at..]), V::load(&rays.t_max[at..]));
+        let tame =
+            finite(org) & finite(dir) & least.cmp_le(size(dir)) & V::constant(0.0).cmp_le(t_min) & t_min.cmp_le(t_max);
+        self.tame[g] = tame.bits();
+        if self.tame[g] != V::ALL {
+            self.odd[g] = Packet::<V>::load(rays, at).2 & !self.tame[g];
         }
     }
 

@@ -39,6 +39,8 @@ pub struct Group {
     pub start: Lanes3<V>,
     /// Rays with a common point behind them: how far, in their parameter; 0 for others.
     pub behind: V,
+    /// Own answers of such rays: which part of the way from that point to the hit is ahead of the start.
+    pub ahead: V,
     /// Depth per unit of the ray's parameter.
     pub speed: V,
     /// Lanes that found something (any-hit).
@@ -57,6 +59,7 @@ impl Default for Group {
             weights: [zero; 3],
             start: [zero; 3],
             behind: zero,
+            ahead: zero,
             speed: zero,
             done: 0,
         }

@@ -7,21 +7,24 @@
 
 use glam::{DMat3, DVec3};
 
-use super::bundle::{Bundle, Shared, load3};
+use super::bundle::{Bundle, Shared, groups, load3};
 use super::{GROUPS, HALF_ULP, Job, Mask, SETS, V, select};
-use crate::lanes::{LaneMask, Lanes, dot, each};
-use crate::ray::{HitPacket, Hits, Rays};
+use crate::lanes::chosen::merge_lists;
+use crate::lanes::words::positions;
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each};
+use crate::ray::{HitPacket, Hits, INVALID_ID, Rays};
 use crate::trace::output::Output;
 use crate::trace::stream;
 
-/// Lines may pass the point at this many half ulps of the largest coordinate and the distance.
-const CLOSE: f32 = 32.0;
+/// Lines may pass the point at this many half ulps of the start's largest coordinate and of the distance, by each axis: what
+/// the rounding of starts and directions leaves, and well below the bound that answers keep.
+const CLOSE: [f32; 2] = [4.0, 1.5];
 
 /// The same for the first guess, which is made from one group.
-const FIRST: f32 = 512.0;
+const FIRST: [f32; 2] = [512.0; 2];
 
 /// Fewest rays worth a tile of their own.
-const LEAST: u32 = 32;
+const LEAST: u32 = 64;
 
 /// Rays of a group that must be free and pass a point for it to be tried.
 const MOSTLY: u32 = 12;
@@ -29,7 +32,7 @@ const MOSTLY: u32 = 12;
 /// Points in a row that may turn out to be none before the rest of a block is left to others.
 const FAILURES: u32 = 4;
 
-/// Most rays a point is made from.
+/// Groups whose rays a point is made from.
 const SAMPLE: usize = V::N;
 
 /// Rays that are left over, traced as a batch of their own.
@@ -44,86 +47,145 @@ pub struct Left {
 /// Rays of a block that are not yet of a point.
 struct Search<'a> {
     rays: &'a Rays<f32>,
-    first: usize,
-    /// Groups.
-    len: usize,
+    /// All of the block, as far as they are sorted.
+    all: Bundle<'a>,
     /// Per group: lanes.
     free: [u32; GROUPS],
-    /// Next group to be tried, in an order that jumps about.
-    next: usize,
+    /// Groups that were tried.
+    tried: usize,
     failures: u32,
 }
 
 impl<'a> Search<'a> {
-    /// The next point and its rays.
-    fn bundle(&mut self) -> Option<Bundle<'a>> {
-        while self.failures < FAILURES && self.next < GROUPS {
-            // 21 and 64 have no common divisor: all groups, far from each other.
-            let g = self.next * 21 % GROUPS;
-            self.next += 1;
-            if g >= self.len || self.free[g].count_ones() < MOSTLY {
-                continue;
-            }
-            match self.around(g) {
-                Some(bundle) => {
-                    (0..self.len).for_each(|g| self.free[g] &= !bundle.tame[g]);
-                    self.failures = 0;
-                    return Some(bundle);
+    /// In the block that starts with ray `first`; `None` if a few groups that are far from each other say that it is not worth
+    /// it.
+    fn new(rays: &'a Rays<f32>, first: usize) -> Option<Self> {
+        let all = Bundle::unsorted(rays, first, groups::<SETS>(rays, first));
+        let mut search = Self { rays, all, free: [0; GROUPS], tried: 0, failures: 0 };
+        loop {
+            let g = search.next()?;
+            search.sort(g);
+            if search.free[g].count_ones() >= MOSTLY {
+                match search.guess(g) {
+                    Some(_) => break,
+                    None => search.failures += 1,
                 }
-                None => self.failures += 1,
+            }
+        }
+        (0..search.all.len).for_each(|g| search.sort(g));
+        (search.tried, search.failures) = (0, 0);
+        Some(search)
+    }
+
+    /// The group that is to be tried next.
+    fn next(&mut self) -> Option<usize> {
+        while self.failures < FAILURES && self.tried < GROUPS {
+            // 21 and 64 have no common divisor: all groups, in an order that jumps about.
+            let g = self.tried * 21 % GROUPS;
+            self.tried += 1;
+            if g < self.all.len {
+                return Some(g);
             }
         }
         None
     }
 
+    /// Tells the lanes of a group that may be of a point.
+    #[inline(always)]
+    fn sort(&mut self, g: usize) {
+        self.all.sort_group(self.rays, g);
+        let at = self.all.first + g * V::N;
+        let (t_min, t_max) = (V::load(&self.rays.t_min[at..]), V::load(&self.rays.t_max[at..]));
+        let whole = t_min.cmp_eq(V::constant(0.0)) & t_max.cmp_eq(V::splat(f32::INFINITY));
+        self.free[g] = self.all.tame[g] & whole.bits();
+    }
+
+    /// The next point and its rays.
+    fn bundle(&mut self) -> Option<Bundle<'a>> {
+        while let Some(g) = self.next() {
+            if self.free[g].count_ones() < MOSTLY {
+                continue;
+            }
+            if let Some(bundle) = self.around(g) {
+                (0..self.all.len).for_each(|g| self.free[g] &= !bundle.tame[g]);
+                self.failures = 0;
+                return Some(bundle);
+            }
+            self.failures += 1;
+        }
+        None
+    }
+
+    /// Two free rays of a group: the first and the last, which are the farthest from each other if rays come by pixels.
+    fn ends(&self, g: usize) -> [usize; 2] {
+        let (lanes, first) = (self.free[g], self.all.first + g * V::N);
+        [first + lanes.trailing_zeros() as usize, first + 31 - lanes.leading_zeros() as usize]
+    }
+
+    /// Where two rays of a group come closest, if most others pass there too.
+    fn guess(&self, g: usize) -> Option<[f32; 3]> {
+        let apex = meeting_point(self.rays, &self.ends(g))?;
+        (self.passing(g, apex, CLOSE).0.count_ones() >= MOSTLY).then_some(apex)
+    }
+
     /// The point that most rays of group `g` pass, and all that pass it.
     fn around(&self, g: usize) -> Option<Bundle<'a>> {
-        let first = self.first + g * V::N;
-        let (mut sample, mut n) = ([0; SAMPLE], 0);
-        for lane in (0..V::N).filter(|lane| self.free[g] >> lane & 1 != 0) {
-            (sample[n], n) = (first + lane, n + 1);
-        }
-        let apex = meeting_point(self.rays, &sample[..n])?;
-        if self.passing(g, apex, CLOSE).0.count_ones() < MOSTLY {
-            return None;
-        }
-        // Made anew from rays all over the block: those of one group are nearly parallel.
-        for (i, ray) in sample[..n].iter_mut().enumerate() {
-            let other = i * self.len / n;
-            let lanes = self.passing(other, apex, FIRST).0;
+        let guess = self.guess(g)?;
+        let Bundle { first, len, .. } = self.all;
+        // Made anew from rays all over the block: two of one group are nearly parallel.
+        let (mut sample, mut n) = ([0; SAMPLE + 2], 2);
+        sample[..2].copy_from_slice(&self.ends(g));
+        for i in 0..SAMPLE {
+            let other = i * len / SAMPLE;
+            let lanes = self.passing(other, guess, FIRST).0;
             if lanes != 0 {
-                *ray = self.first + other * V::N + lanes.trailing_zeros() as usize;
+                (sample[n], n) = (first + other * V::N + lanes.trailing_zeros() as usize, n + 1);
             }
         }
         let apex = meeting_point(self.rays, &sample[..n])?;
         let (mut tame, mut slack, mut count) = ([0; GROUPS], V::constant(0.0), 0);
-        for g in 0..self.len {
+        for g in 0..len {
             let (lanes, miss) = self.passing(g, apex, CLOSE);
             (tame[g], slack, count) = (lanes, miss.fast_max(slack), count + lanes.count_ones());
         }
+        if count < LEAST {
+            return None;
+        }
         let slack = slack.to_array().into_iter().fold(0.0, f32::max);
-        (count >= LEAST).then(|| Bundle::behind(self.rays, self.first, self.len, apex, slack, tame))
+        let unsorted = Bundle::unsorted(self.rays, first, len);
+        Some(Bundle { apex, slack, shared: Shared::Behind, tame, ..unsorted })
     }
 
     /// Free rays of a group whose lines pass `apex` behind their starts, at `close` half ulps; and how far at most.
     #[inline(always)]
-    fn passing(&self, g: usize, apex: [f32; 3], close: f32) -> (u32, V) {
+    fn passing(&self, g: usize, apex: [f32; 3], close: [f32; 2]) -> (u32, V) {
         if self.free[g] == 0 {
             return (0, V::constant(0.0));
         }
-        let at = self.first + g * V::N;
+        let at = self.all.first + g * V::N;
         let (org, dir) = (load3(&self.rays.org, at), load3(&self.rays.dir, at));
         let way = each(|a| org[a] - V::splat(apex[a]));
-        let before = dot(way, dir) / dot(dir, dir);
-        let [x, y, z] = each(|a| (-before).mul_add(dir[a], way[a]).abs());
-        let size = |v: [V; 3]| v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs());
-        // Also what the differences round.
-        let miss = size(way).mul_add(V::splat(4.0 * HALF_ULP), x + y + z);
-        let most = (size(org) + size(way)) * V::splat(close * HALF_ULP);
+        // Twice, as the first time rounds about as much as is looked for.
+        let rcp = V::constant(1.0) / dot(dir, dir);
+        let across = |v: Lanes3<V>, along: V| each(|a| (-along).mul_add(dir[a], v[a]));
+        let before = dot(way, dir) * rcp;
+        let rest = across(way, before);
+        let rest = across(rest, dot(rest, dir) * rcp);
+        let (miss, distance) = (largest(rest), largest(way));
+        let [near, far] = close.map(|x| V::splat(x * HALF_ULP));
+        let most = near.mul_add(largest(org), far * distance);
+        // By all axes together, and with what the differences round.
+        let slack = V::splat(4.0 * HALF_ULP).mul_add(distance, V::constant(3.0) * miss);
         let passes = miss.cmp_le(most) & V::constant(0.0).cmp_lt(before);
         let lanes = passes.bits() & self.free[g];
-        (lanes, select(Mask::from_bits(lanes), miss, V::constant(0.0)))
+        (lanes, select(Mask::from_bits(lanes), slack, V::constant(0.0)))
     }
+}
+
+/// The largest component of each vector, absolute.
+#[inline(always)]
+fn largest(v: Lanes3<V>) -> V {
+    v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs())
 }
 
 /// The point nearest to the lines of some rays, by least squares.
@@ -148,28 +210,23 @@ impl Job<'_> {
     /// Traces the rays of a block that are of such points; the others are left over. False if there are no points.
     #[cold]
     #[inline(never)]
-    pub fn mirrored<const COUNT: bool>(&mut self, first: usize) -> bool {
-        let all = Bundle::sorted::<SETS>(self.rays, first);
-        let mut free = all.tame;
-        for (g, free) in free.iter_mut().enumerate().take(all.len) {
-            let at = first + g * V::N;
-            *free &= V::load(&self.rays.t_min[at..]).cmp_eq(V::constant(0.0)).bits();
-        }
-        let mut search = Search { rays: self.rays, first, len: all.len, free, next: 0, failures: 0 };
+    pub fn mirrored<const EXACT: bool, const COUNT: bool>(&mut self, first: usize) -> bool {
+        let Some(mut search) = Search::new(self.rays, first) else { return false };
         let mut done = [0; GROUPS];
+        let len = search.all.len;
         while let Some(bundle) = search.bundle() {
             let groups = bundle.groups();
-            for g in (0..all.len).filter(|&g| groups >> g & 1 != 0 && done[g] == 0 && bundle.tame[g] != V::ALL) {
+            for g in (0..len).filter(|&g| groups >> g & 1 != 0 && done[g] == 0 && bundle.tame[g] != V::ALL) {
                 self.miss(first + g * V::N);
             }
-            let traced = self.behind::<COUNT>(&bundle, groups);
-            for g in (0..all.len).filter(|g| traced >> g & 1 != 0) {
+            let traced = self.behind::<EXACT, COUNT>(&bundle, groups);
+            for g in (0..len).filter(|g| traced >> g & 1 != 0) {
                 done[g] |= bundle.tame[g];
             }
         }
         let found = done.iter().any(|&lanes| lanes != 0);
-        for g in (0..all.len).filter(|_| found) {
-            let left = (all.tame[g] | all.odd[g]) & !done[g];
+        for g in (0..len).filter(|_| found) {
+            let left = (search.all.tame[g] | search.all.odd[g]) & !done[g];
             let at = first + g * V::N;
             if done[g] == 0 {
                 self.memory.rest.push(at);
@@ -190,14 +247,14 @@ impl Job<'_> {
 
     /// Traces the rays of a point as one tile, or as one for each set. Returns the groups that were traced: others spread too
     /// wide.
-    fn behind<const COUNT: bool>(&mut self, bundle: &Bundle, groups: u64) -> u64 {
-        if self.tile::<SETS, false, true, COUNT>(bundle, groups) {
+    fn behind<const EXACT: bool, const COUNT: bool>(&mut self, bundle: &Bundle, groups: u64) -> u64 {
+        if self.tile::<SETS, false, EXACT, COUNT>(bundle, groups) {
             return groups;
         }
         let mut traced = 0;
         for q in 0..SETS {
             let here = groups >> (16 * q) & 0xffff;
-            if here != 0 && self.tile::<1, false, true, COUNT>(&bundle.set(q), here) {
+            if here != 0 && self.tile::<1, false, EXACT, COUNT>(&bundle.set(q), here) {
                 traced |= here << (16 * q);
             }
         }
@@ -229,23 +286,25 @@ impl Job<'_> {
     }
 }
 
+/// Writes the hits of some lanes of a group; what is there of the others stays.
+#[inline(always)]
+pub fn put(hit: &HitPacket<V>, hits: &mut Hits<f32>, first: usize, lanes: u32) {
+    let mask = Mask::from_bits(lanes);
+    let found = Mask::from_bits(!positions(&hit.prim, INVALID_ID));
+    let t = select(found, hit.t, V::splat(f32::INFINITY));
+    for (x, to) in [(t, &mut hits.t), (hit.u, &mut hits.u), (hit.v, &mut hits.v)] {
+        select(mask, x, V::load(&to[first..])).store(&mut to[first..]);
+    }
+    for (list, to) in [(hit.prim, &mut hits.prim), (hit.inst, &mut hits.inst)] {
+        if let Some(to) = to[first..].first_chunk_mut() {
+            *to = merge_lists(mask, list, *to);
+        }
+    }
+}
+
 impl Left {
     /// Rays waiting.
     pub fn len(&self) -> usize {
         self.ids.len()
-    }
-}
-
-impl<'a> Bundle<'a> {
-    /// Rays whose lines pass `apex` behind their starts.
-    fn behind(
-        rays: &'a Rays<f32>,
-        first: usize,
-        len: usize,
-        apex: [f32; 3],
-        slack: f32,
-        tame: [u32; GROUPS],
-    ) -> Self {
-        Self { apex, slack, shared: Shared::Behind, tame, odd: [0; GROUPS], ..Self::unsorted(rays, first, len) }
     }
 }

@@ -1,4 +1,5 @@
-//! Tiles: up to 1024 rays with a common origin, or (any-hit) a common end, through the 8-wide tree together.
+//! Tiles: up to 1024 rays with a common origin, a common end (any-hit), or a common point behind them ([`mirror`]),
+//! through the 8-wide tree together.
 //!
 //! The speed comes from doing per tile what packets do per ray: one node test is eight boxes against the whole tile,
 //! triangles are set up once per tile, and a ray's share of a triangle test is four linear functions of its two
@@ -175,7 +176,7 @@ impl<'a> Job<'a> {
                 self.block::<ANY, EXACT, COUNT>(&bundle);
                 continue;
             }
-            if mirrors && self.mirrored::<COUNT>(first) {
+            if mirrors && self.mirrored::<EXACT, COUNT>(first) {
                 if self.memory.left.len() > stream::SOURCE {
                     self.leftovers::<COUNT>();
                 }
@@ -309,7 +310,9 @@ impl<'a> Job<'a> {
             self.output.put_any(first, V::N, done);
             return;
         }
-        if !EXACT && odd == 0 {
+        let lanes = exact.bundle.tame[g];
+        let is_part = exact.bundle.shared == Shared::Behind && lanes != V::ALL;
+        if !EXACT && odd == 0 && !is_part {
             if let Output::Closest(hits) = &mut self.output {
                 self.memory.groups.store_own(g, exact.bundle, hits, self.past);
             }
@@ -327,9 +330,9 @@ impl<'a> Job<'a> {
             hit = self.rest::<ANY, COUNT>(first, odd, Some(hit)).0;
         }
         if let Output::Closest(hits) = &mut self.output {
-            match exact.bundle.shared {
-                Shared::Behind => hit.store_lanes(hits, first, exact.bundle.tame[g]),
-                _ => hit.store(hits, first),
+            match is_part {
+                true => mirror::put(&hit, hits, first, lanes),
+                false => hit.store(hits, first),
             }
         }
     }

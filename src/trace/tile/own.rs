@@ -108,7 +108,30 @@ pub fn pair_to_end(groups: &mut Groups, planes: &Planes, g: usize, i: usize) -> 
     Verdict { hit: occlude(groups, g, inside & reached), doubt }
 }
 
-/// How far the segments of a group start behind a triangle's plane as seen from their common end; in some unit.
+/// One triangle against the rays of one group that share a point behind them. As with a common end, which side of a triangle
+/// they start on is told by the start; and so is how far ahead of it they hit.
+#[inline(always)]
+pub fn pair_ahead(groups: &mut Groups, planes: &Planes, g: usize, i: usize, id: Id) -> Verdict {
+    let (inside, maybe, [e0, e1, e2]) = inside(groups, planes, g, i);
+    let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
+    let best = groups.of[g].inv_lo;
+    let ahead = -behind(groups, planes, g, i);
+    let reached = V::constant(0.0).cmp_le(ahead) & best.cmp_le(inverse);
+    let nearer = best.cmp_lt(inverse) | id.comes_first::<false>(groups, g);
+    let hit = inside & reached & nearer;
+    groups.of[g].inv_lo = select(hit, inverse, best);
+    groups.of[g].ahead = select(hit, ahead * V::splat(planes.rcp[i]), groups.of[g].ahead);
+    id.name::<false>(groups, g, hit);
+    let own = |e: V, k: usize| e - V::splat(planes.eps[k][i]);
+    let (e0, e1, e2) = (own(e0, 0), own(e1, 1), own(e2, 2));
+    let weights = &mut groups.of[g].weights;
+    weights[0] = select(hit, e1, weights[0]);
+    weights[1] = select(hit, e2, weights[1]);
+    weights[2] = select(hit, e0 + e1 + e2, weights[2]);
+    Verdict { hit: hit.any(), doubt: (maybe & reached).any() }
+}
+
+/// How far the segments of a group start behind a triangle's plane as seen from their common point; in some unit.
 #[inline(always)]
 fn behind(groups: &Groups, planes: &Planes, g: usize, i: usize) -> V {
     let [x, y, z] = each(|a| groups.of[g].start[a] - V::splat(planes.side[a][i]));
@@ -138,8 +161,13 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     } else {
         maybe = maybe & best.cmp_le(inverse);
     }
+    let mut ahead = V::constant(0.0);
     if !ANY {
         maybe = maybe & (best.cmp_lt(inverse) | id.comes_first::<MANY>(groups, g));
+        if groups.is_behind {
+            ahead = -behind(groups, planes, g, i);
+            maybe = maybe & V::constant(0.0).cmp_le(ahead);
+        }
     }
     let (mut rest, mut hit) = (maybe.bits(), 0);
     let mut weights = groups.of[g].weights.map(V::to_array);
@@ -158,6 +186,7 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
         return occlude(groups, g, hit);
     }
     groups.of[g].inv_lo = select(hit, inverse, best);
+    groups.of[g].ahead = select(hit, ahead * V::splat(planes.rcp[i]), groups.of[g].ahead);
     id.name::<MANY>(groups, g, hit);
     groups.of[g].weights = weights.map(V::new);
     hit.any()
@@ -235,11 +264,15 @@ pub fn decide<const ANY: bool, const MANY: bool>(
             any |= occlude(groups, g, hit);
             return;
         }
-        let inverse = (one / (found.t * groups.of[g].speed)).fast_min(V::splat(f32::MAX));
+        let way = found.t + groups.of[g].behind;
+        let inverse = (one / (way * groups.of[g].speed)).fast_min(V::splat(f32::MAX));
         let best = groups.of[g].inv_lo;
         let tie = best.cmp_eq(inverse) & id.comes_first::<MANY>(groups, g);
         let wins = hit & (best.cmp_lt(inverse) | tie);
         groups.of[g].inv_lo = select(wins, inverse, best);
+        if groups.is_behind {
+            groups.of[g].ahead = select(wins, found.t / way, groups.of[g].ahead);
+        }
         id.name::<MANY>(groups, g, wins);
         for (weight, x) in groups.of[g].weights.iter_mut().zip([found.u, found.v, one]) {
             *weight = select(wins, x, *weight);
@@ -256,7 +289,8 @@ impl Groups {
         let found = Mask::from_bits(!positions(&self.of[g].slot, NO_SLOT));
         let one = V::constant(1.0);
         let [t_min, t_max] = bundle.ends(g);
-        let t = t_min.fast_max(t_max.fast_min(one / (self.of[g].inv_lo * self.of[g].speed)));
+        let part = if self.is_behind { self.of[g].ahead } else { one };
+        let t = t_min.fast_max(t_max.fast_min(part / (self.of[g].inv_lo * self.of[g].speed)));
         let [u, v, sum] = self.of[g].weights;
         let scale = one / sum;
         let or_zero = |x: V| select(found, x * scale, V::constant(0.0));

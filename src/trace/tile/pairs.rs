@@ -4,7 +4,7 @@ use super::batch::{BATCH, Planes};
 use super::bundle::Shared;
 use super::exact::{self, Exact, certain_pair};
 use super::groups::Groups;
-use super::own::{self, Id, Verdict, own_depth, pair, pair_doubtful, pair_to_end};
+use super::own::{self, Id, Verdict, own_depth, pair, pair_ahead, pair_doubtful, pair_to_end};
 use super::{GROUPS, Memory, SET, V};
 use crate::lanes::words::list_bits;
 use crate::lanes::{LaneMask, Lanes, each};
@@ -81,6 +81,8 @@ fn test<const ANY: bool, const EXACT: bool, const MANY: bool, const COUNT: bool>
         } else {
             let Verdict { hit, doubt } = if ANY && to_end {
                 pair_to_end(groups, planes, g, i)
+            } else if !ANY && groups.is_behind {
+                pair_ahead(groups, planes, g, i, id)
             } else {
                 pair::<ANY, MANY>(groups, planes, g, i, id)
             };
