@@ -165,7 +165,7 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slo
         });
     }
     // From here on the depth is known as well as the common formula knows it.
-    let inverse = V::constant(1.0) / ((t + groups.of[g].behind) * groups.of[g].speed);
+    let inverse = V::constant(1.0) / (groups.way(g, t) * groups.of[g].speed);
     let loose = groups.loose;
     let mask = Mask::from_bits(wins);
     groups.of[g].inv_lo = select(mask, bounded(inverse) * V::splat(1.0 - loose), groups.of[g].inv_lo);

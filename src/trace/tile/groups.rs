@@ -37,10 +37,6 @@ pub struct Group {
     /// Rays without a common start: where their segments start, in the axes of the geometry and
     /// the scale of the frame.
     pub start: Lanes3<V>,
-    /// Rays with a common point behind them: how far, in their parameter; 0 for others.
-    pub behind: V,
-    /// Own answers of such rays: which part of the way from that point to the hit is ahead of the start.
-    pub ahead: V,
     /// Depth per unit of the ray's parameter.
     pub speed: V,
     /// Lanes that found something (any-hit).
@@ -58,8 +54,6 @@ impl Default for Group {
             slot: [NO_SLOT; 16],
             weights: [zero; 3],
             start: [zero; 3],
-            behind: zero,
-            ahead: zero,
             speed: zero,
             done: 0,
         }
@@ -80,6 +74,10 @@ pub struct Groups {
     pub ends_early: bool,
     /// The common point is behind where segments start.
     pub is_behind: bool,
+    /// How far behind, by group and in the rays' parameter. Apart from [`Group`], as other tiles do not need it.
+    behind: [V; GROUPS],
+    /// Own answers: which part of the way from that point to the best hit is ahead of the start.
+    pub ahead: [V; GROUPS],
     /// Surely no segment starts nearer than at this depth.
     pub front: f32,
     /// Relative error of depths computed from a ray's parameter.
@@ -117,6 +115,8 @@ impl Default for Groups {
             inst: [[NO_SLOT; 16]; GROUPS],
             ends_early: false,
             is_behind: false,
+            behind: [V::splat(0.0); GROUPS],
+            ahead: [V::splat(0.0); GROUPS],
             front: 0.0,
             loose: 0.0,
             rect: [[zero; 2]; 2],
@@ -148,7 +148,7 @@ struct Lines {
     fit: u32,
     /// Distance from the common end (0 for a common start).
     reach: V,
-    /// See [`Group::behind`].
+    /// See [`Groups::behind`].
     behind: V,
 }
 
@@ -190,7 +190,6 @@ impl Groups {
                 }
                 let lanes = Mask::from_bits(tame);
                 (self.of[g].s, self.of[g].t, self.of[g].speed) = (lines.s, lines.t, lines.speed);
-                self.of[g].behind = lines.behind;
                 if bundle.shared != Shared::Start {
                     self.of[g].start = map3(bundle.starts(g), |x| x * V::splat(self.frame.scale));
                 }
@@ -200,7 +199,10 @@ impl Groups {
                 highs[1][i] = select(lanes, -lines.t, most);
                 near = select(lanes, lines.near, most).fast_min(near);
                 reach = select(lanes, lines.reach, reach).fast_max(reach);
-                front = select(lanes, lines.behind * lines.speed, front).fast_min(front);
+                if bundle.shared == Shared::Behind {
+                    self.behind[g] = lines.behind;
+                    front = select(lanes, lines.behind * lines.speed, front).fast_min(front);
+                }
                 self.of[g].inv_lo = select(lanes, bounded(lines.far), most);
                 self.of[g].inv_hi = select(lanes, if EXACT { lines.far } else { lines.near }, most);
             }
@@ -254,6 +256,12 @@ impl Groups {
             self.of[g].inv_hi *= V::splat(1.0 + loose);
         }
         self.cap = least(near) * (1.0 - loose);
+    }
+
+    /// How far a group's rays have gone from the common point, in their parameter, where that is `t`.
+    #[inline(always)]
+    pub fn way(&self, g: usize, t: V) -> V {
+        if self.is_behind { t + self.behind[g] } else { t }
     }
 
     /// About how many rays, as dense as those of the tile, a box in world space would be met by; infinite if the common

@@ -16,6 +16,7 @@
 
 mod batch;
 mod bundle;
+mod edges;
 mod engine;
 mod exact;
 mod frame;

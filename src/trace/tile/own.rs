@@ -120,7 +120,7 @@ pub fn pair_ahead(groups: &mut Groups, planes: &Planes, g: usize, i: usize, id: 
     let nearer = best.cmp_lt(inverse) | id.comes_first::<false>(groups, g);
     let hit = inside & reached & nearer;
     groups.of[g].inv_lo = select(hit, inverse, best);
-    groups.of[g].ahead = select(hit, ahead * V::splat(planes.rcp[i]), groups.of[g].ahead);
+    groups.ahead[g] = select(hit, ahead * V::splat(planes.rcp[i]), groups.ahead[g]);
     id.name::<false>(groups, g, hit);
     let own = |e: V, k: usize| e - V::splat(planes.eps[k][i]);
     let (e0, e1, e2) = (own(e0, 0), own(e1, 1), own(e2, 2));
@@ -186,7 +186,7 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
         return occlude(groups, g, hit);
     }
     groups.of[g].inv_lo = select(hit, inverse, best);
-    groups.of[g].ahead = select(hit, ahead * V::splat(planes.rcp[i]), groups.of[g].ahead);
+    groups.ahead[g] = select(hit, ahead * V::splat(planes.rcp[i]), groups.ahead[g]);
     id.name::<MANY>(groups, g, hit);
     groups.of[g].weights = weights.map(V::new);
     hit.any()
@@ -264,14 +264,14 @@ pub fn decide<const ANY: bool, const MANY: bool>(
             any |= occlude(groups, g, hit);
             return;
         }
-        let way = found.t + groups.of[g].behind;
+        let way = groups.way(g, found.t);
         let inverse = (one / (way * groups.of[g].speed)).fast_min(V::splat(f32::MAX));
         let best = groups.of[g].inv_lo;
         let tie = best.cmp_eq(inverse) & id.comes_first::<MANY>(groups, g);
         let wins = hit & (best.cmp_lt(inverse) | tie);
         groups.of[g].inv_lo = select(wins, inverse, best);
         if groups.is_behind {
-            groups.of[g].ahead = select(wins, found.t / way, groups.of[g].ahead);
+            groups.ahead[g] = select(wins, found.t / way, groups.ahead[g]);
         }
         id.name::<MANY>(groups, g, wins);
         for (weight, x) in groups.of[g].weights.iter_mut().zip([found.u, found.v, one]) {
@@ -289,7 +289,7 @@ impl Groups {
         let found = Mask::from_bits(!positions(&self.of[g].slot, NO_SLOT));
         let one = V::constant(1.0);
         let [t_min, t_max] = bundle.ends(g);
-        let part = if self.is_behind { self.of[g].ahead } else { one };
+        let part = if self.is_behind { self.ahead[g] } else { one };
         let t = t_min.fast_max(t_max.fast_min(part / (self.of[g].inv_lo * self.of[g].speed)));
         let [u, v, sum] = self.of[g].weights;
         let scale = one / sum;

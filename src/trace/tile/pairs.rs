@@ -38,9 +38,10 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     let Memory { groups, batch, planes, pairs, .. } = memory;
     let seen = batch.set_up::<ANY, EXACT>(groups, planes);
     let (count, touched) = list::<N, EXACT>(seen, &batch.groups, groups, planes, pairs);
-    let found = match !EXACT && groups.many {
-        true => test::<ANY, EXACT, true, COUNT>(memory, exact, count, counters),
-        false => test::<ANY, EXACT, false, COUNT>(memory, exact, count, counters),
+    let found = match (!EXACT && groups.many, !ANY && groups.is_behind) {
+        (true, _) => test::<ANY, EXACT, true, false, COUNT>(memory, exact, count, counters),
+        (_, true) => test::<ANY, EXACT, false, true, COUNT>(memory, exact, count, counters),
+        _ => test::<ANY, EXACT, false, false, COUNT>(memory, exact, count, counters),
     };
     memory.batch.clear();
     memory.slabs.learn(count, found);
@@ -49,9 +50,10 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     }
 }
 
-/// Tests the first `count` pairs; returns how many gave something. `MANY`: triangles are of instances.
+/// Tests the first `count` pairs; returns how many gave something. `MANY`: triangles are of instances. `BEHIND`: the common
+/// point is behind the rays.
 #[inline(always)]
-fn test<const ANY: bool, const EXACT: bool, const MANY: bool, const COUNT: bool>(
+fn test<const ANY: bool, const EXACT: bool, const MANY: bool, const BEHIND: bool, const COUNT: bool>(
     memory: &mut Memory,
     exact: &Exact,
     count: usize,
@@ -64,10 +66,7 @@ fn test<const ANY: bool, const EXACT: bool, const MANY: bool, const COUNT: bool>
         let (g, i) = (usize::from(pairs.group[k]) & (GROUPS - 1), usize::from(pairs.triangle[k]) & 15);
         let id = Id { inst: batch.inst[i], prim: batch.id[i] };
         if EXACT {
-            let (certain, doubtful) = match groups.is_behind {
-                true => certain_pair::<ANY, true>(groups, planes, g, i, batch.id[i]),
-                false => certain_pair::<ANY, false>(groups, planes, g, i, batch.id[i]),
-            };
+            let (certain, doubtful) = certain_pair::<ANY, BEHIND>(groups, planes, g, i, batch.id[i]);
             found += usize::from(certain | doubtful != 0);
             if doubtful != 0 {
                 exact::decide::<ANY>(groups, exact, g, batch.id[i], doubtful);
@@ -81,7 +80,7 @@ fn test<const ANY: bool, const EXACT: bool, const MANY: bool, const COUNT: bool>
         } else {
             let Verdict { hit, doubt } = if ANY && to_end {
                 pair_to_end(groups, planes, g, i)
-            } else if !ANY && groups.is_behind {
+            } else if BEHIND {
                 pair_ahead(groups, planes, g, i, id)
             } else {
                 pair::<ANY, MANY>(groups, planes, g, i, id)
