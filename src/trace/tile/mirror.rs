@@ -61,7 +61,8 @@ impl<'a> Search<'a> {
     /// it.
     fn new(rays: &'a Rays<f32>, first: usize) -> Option<Self> {
         let all = Bundle::unsorted(rays, first, groups::<SETS>(rays, first));
-        let mut search = Self { rays, all, free: [0; GROUPS], tried: 0, failures: 0 };
+        // One chance less than later: what does not look like a mirror mostly is none.
+        let mut search = Self { rays, all, free: [0; GROUPS], tried: 0, failures: 1 };
         loop {
             let g = search.next()?;
             search.sort(g);
@@ -208,7 +209,6 @@ fn meeting_point(rays: &Rays<f32>, sample: &[usize]) -> Option<[f32; 3]> {
 
 impl Job<'_> {
     /// Traces the rays of a block that are of such points; the others are left over. False if there are no points.
-    #[cold]
     #[inline(never)]
     pub fn mirrored<const EXACT: bool, const COUNT: bool>(&mut self, first: usize) -> bool {
         let Some(mut search) = Search::new(self.rays, first) else { return false };
