@@ -235,7 +235,7 @@ impl Groups {
         if self.is_behind {
             let front = least(front);
             self.loose += 4.0 * self.slack / front;
-            if self.loose.is_nan() || self.loose > MOST_LOOSE {
+            if !(0.0..=MOST_LOOSE).contains(&self.loose) {
                 return false;
             }
             self.front = front * (1.0 - self.loose);

@@ -2,8 +2,9 @@
 //! the mirror image of where they came from. A block's rays are sorted by such points here, by looking at nothing but the
 //! rays; those of one point are a tile that is seen from there and starts at the mirror.
 //!
-//! No more is asked of the point than that the lines pass it closely; how far they do is measured and goes into the error
-//! bounds ([`Bundle::slack`]). Decisions are those of `EXACT`: the common formula's, bit by bit, whatever point was found.
+//! No more is asked of the point than that the lines pass it closely. How far they do is measured and goes into the error
+//! bounds ([`Bundle::slack`]), so with `EXACT` answers are the common formula's, bit by bit, whatever point was found; the
+//! tile's own keep their bound, as lines miss the point by no more than what rounds anyway ([`CLOSE`]).
 
 use glam::{DMat3, DVec3};
 
