@@ -228,11 +228,12 @@ fn mirror_rays() {
         compile([walls].into_iter().chain(placed).collect())
     };
     let away = DVec3::new(300.0, -700.0, 1000.0);
-    for (name, world) in [
-        ("empty", room(1.0, DVec3::ZERO, vec![])),
-        ("soup", room(1.0, DVec3::ZERO, vec![soup(500, &mut r)])),
-        ("ball and soup far away", room(1.0, away, vec![ball(30, 40), soup(500, &mut r)])),
-        ("small", room(1e-3, DVec3::ZERO, vec![ball(30, 40), soup(2000, &mut r)])),
+    // With the least share of the triangle tests that tiles do: what a ball and small triangles throw back has no point.
+    for (name, least_share, world) in [
+        ("empty", 0.8, room(1.0, DVec3::ZERO, vec![])),
+        ("soup", 0.3, room(1.0, DVec3::ZERO, vec![soup(500, &mut r)])),
+        ("ball and soup far away", 0.15, room(1.0, away, vec![ball(30, 40), soup(500, &mut r)])),
+        ("small", 0.1, room(1e-3, DVec3::ZERO, vec![ball(30, 40), soup(2000, &mut r)])),
     ] {
         let (lo, hi) = world.bounds().unwrap();
         let place = |f: DVec3| 0.5 * (lo + hi) + 0.5 * (hi - lo) * f;
@@ -264,7 +265,7 @@ fn mirror_rays() {
         let share = counters.prim_lanes_linear as f64 / counters.prim_lanes_total as f64;
         println!("{name}: {traced} mirror rays, all bits equal; {share:.2} of the triangle tests in tiles");
         assert!(traced > 50_000, "{name}: {traced}");
-        assert!(share > 0.2, "{name}: {share}");
+        assert!(share > least_share, "{name}: {share}");
     }
 }
 
