@@ -7,7 +7,7 @@ mod tile_support;
 use std::path::Path;
 
 use common::{Random, ball, soup};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use lanecast::ray::{Counters, Hits, Rays};
 use lanecast::scene::mesh::Mesh;
 use lanecast::scene::world::{Preset, World};
@@ -212,6 +212,18 @@ fn cube() -> Mesh {
     mesh
 }
 
+/// Long triangles that are 1000 times as long as wide, in the cube of half-width 4.
+fn needles(n: u32, r: &mut Random) -> Mesh {
+    let mut mesh = Mesh::default();
+    for i in 0..n {
+        let (one, other) = (4.0 * r.in_cube(), 4.0 * r.in_cube());
+        let beside = one.lerp(other, r.unit()) + 1e-3 * (other - one).length() * r.direction();
+        mesh.positions.extend([one, other, beside].map(|p| p.as_vec3().as_dvec3()));
+        mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+    }
+    mesh
+}
+
 /// Rooms whose walls are mirrors, with things in them that are not flat: of what a wall throws back most has a common point
 /// behind the wall.
 #[test]
@@ -232,6 +244,7 @@ fn mirror_rays() {
     for (name, least_share, world) in [
         ("empty", 0.8, room(1.0, DVec3::ZERO, vec![])),
         ("soup", 0.3, room(1.0, DVec3::ZERO, vec![soup(500, &mut r)])),
+        ("needles", 0.15, room(1.0, DVec3::ZERO, vec![needles(3000, &mut r)])),
         ("ball and soup far away", 0.15, room(1.0, away, vec![ball(30, 40), soup(500, &mut r)])),
         ("small", 0.1, room(1e-3, DVec3::ZERO, vec![ball(30, 40), soup(2000, &mut r)])),
     ] {
@@ -266,6 +279,38 @@ fn mirror_rays() {
         println!("{name}: {traced} mirror rays, all bits equal; {share:.2} of the triangle tests in tiles");
         assert!(traced > 50_000, "{name}: {traced}");
         assert!(share > least_share, "{name}: {share}");
+    }
+}
+
+/// Blocks on a lattice, seen from points that lie in the planes of many of their sides: those are seen edge-on.
+#[test]
+fn eyes_in_the_planes_of_triangles() {
+    let mut r = Random(31);
+    let mut blocks = Mesh::default();
+    for _ in 0..150 {
+        let at = (6.0 * r.in_cube()).round();
+        let first = blocks.positions.len() as u32;
+        let one = cube();
+        blocks.positions.extend(one.positions.iter().map(|p| 0.5 * *p + at + 0.5));
+        blocks.triangles.extend(one.triangles.iter().map(|t| t.map(|i| i + first)));
+    }
+    // Turned a little, so that sides lie in such planes but for rounding.
+    let mut turned = blocks.clone();
+    let turn = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.3);
+    turned.positions.iter_mut().for_each(|p| *p = (turn * *p).as_vec3().as_dvec3());
+    for (world, turn) in [(compile(vec![blocks]), DQuat::IDENTITY), (compile(vec![turned]), turn)] {
+        let mut hits = 0;
+        for case in 0..30 {
+            let eye = (7.0 * r.in_cube()).round();
+            let mut target = 4.0 * r.in_cube();
+            target[case % 3] = eye[case % 3];
+            let rays = camera(turn * eye, turn * target, [1e-6, 1e-3, 0.5][case / 3 % 3], 64);
+            assert_eq!(differences(&world, &rays), (0, 0), "case {case}");
+            let thrown = mirrored(&world, &rays);
+            hits += thrown.live_count();
+            assert_eq!(differences(&world, &thrown), (0, 0), "mirror rays of case {case}");
+        }
+        assert!(hits > 30_000, "{hits}");
     }
 }
 

@@ -40,6 +40,9 @@ const MOST_SHIFT: f32 = 10.0 * HALF_ULP;
 /// Edge functions must add up to this many times their error, so that there is something to divide by.
 const LEAST_SUM: f32 = 8.0;
 
+/// A distance between the apex and a plane is certain beyond this part of the products it is made of.
+const LEAST_DISTANCE: f32 = 32.0 * HALF_ULP;
+
 /// A depth interval wider than this says nothing.
 const WILD: f32 = 0.25;
 
@@ -103,6 +106,8 @@ pub struct Planes {
     pub wild: u32,
     /// Own answers: triangles whose edges need more digits, bit by triangle.
     pub unsteady: u32,
+    /// Own answers, rays with a common point behind them: triangles whose `rcp` is not certain, bit by triangle.
+    pub flat: u32,
     /// Own answers: the corners in the frame.
     pub corners: [[[f32; BATCH]; 3]; 3],
     /// Signs of x and y of each linear function, bit by triangle.
@@ -244,7 +249,9 @@ impl Batch {
         let back = volume.cmp_lt(V::constant(0.0));
         let side = corner.into_iter().chain(map3(normal, |x| select(back, -x, x)));
         planes.side.iter_mut().zip(side).for_each(|(to, x)| x.store(to));
-        (V::constant(1.0) / volume.abs()).store(&mut planes.rcp);
+        let (size, products) = (volume.abs(), dot(map3(normal, V::abs), map3(from_apex, V::abs)));
+        (V::constant(1.0) / size).store(&mut planes.rcp);
+        planes.flat = size.cmp_le(products * V::splat(LEAST_DISTANCE)).bits();
     }
 
     /// Set-up for the tile's own answers.
@@ -291,6 +298,9 @@ impl Batch {
         let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
         planes.wild = in_front & !V::splat(LEAST_VOLUME).cmp_le(size).bits();
         planes.unsteady = in_front & !steady.bits();
+        if groups.is_behind {
+            planes.unsteady |= planes.flat;
+        }
         // With its rounding error added, an edge function is positive wherever the exact one is.
         let [e0, e1, e2] = each(|k| [edges[k][0], edges[k][1], edges[k][2] + eps[k]]);
         planes.eps.iter_mut().zip(eps).for_each(|(to, x)| x.store(to));
@@ -300,6 +310,13 @@ impl Batch {
 }
 
 impl Planes {
+    /// The normal of triangle `i` that points away from the apex, and the way from its first corner to some starts.
+    #[inline(always)]
+    pub fn to_starts(&self, i: usize, starts: &Lanes3<V>) -> (Lanes3<V>, Lanes3<V>) {
+        let way = each(|a| starts[a] - V::splat(self.side[a][i]));
+        (each(|a| V::splat(self.side[a + 3][i])), way)
+    }
+
     /// Keeps the linear functions; returns the triangles whose largest values over the tile do not rule them out.
     /// `bound` is the largest 1/z that may be found, from the largest value of its function.
     #[inline(always)]

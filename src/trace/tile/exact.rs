@@ -122,8 +122,7 @@ pub fn certain_pair<const ANY: bool, const BEHIND: bool>(
 /// together with that of the common formula: both are sums of three products with differences of coordinates.
 #[inline(always)]
 fn start_beyond(groups: &Groups, planes: &Planes, g: usize, i: usize) -> (V, V) {
-    let way = each(|a| groups.of[g].start[a] - V::splat(planes.side[a][i]));
-    let normal: [V; 3] = each(|a| V::splat(planes.side[a + 3][i]));
+    let (normal, way) = planes.to_starts(i, &groups.of[g].start);
     let beyond = dot(normal, way);
     let size = dot(map3(normal, V::abs), map3(way, V::abs));
     (beyond, size.mul_add(V::splat(START), V::splat(planes.facing[i])))

@@ -301,7 +301,8 @@ impl Groups {
         let mut behind = zero;
         let (far, near, reach) = match bundle.shared {
             Shared::Behind => {
-                let way = each(|a| bundle.starts(g)[a] - V::splat(bundle.apex[a]));
+                let starts = bundle.starts(g);
+                let way = each(|a| starts[a] - V::splat(bundle.apex[a]));
                 behind = dot(way, direction) / dot(direction, direction);
                 // Where a segment starts is told by the start itself.
                 (slowness / (t_max + behind), V::splat(f32::INFINITY), zero)

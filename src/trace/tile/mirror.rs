@@ -9,7 +9,7 @@
 use glam::{DMat3, DVec3};
 
 use super::bundle::{Bundle, Shared, groups, load3};
-use super::{GROUPS, HALF_ULP, Job, Mask, SETS, V, select};
+use super::{GROUPS, HALF_ULP, Job, Mask, SET, SETS, V, select};
 use crate::lanes::chosen::merge_lists;
 use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each};
@@ -225,8 +225,10 @@ impl Job<'_> {
                 done[g] |= bundle.tame[g];
             }
         }
-        let found = done.iter().any(|&lanes| lanes != 0);
-        for g in (0..len).filter(|_| found) {
+        if done == [0; GROUPS] {
+            return false;
+        }
+        for g in 0..len {
             let left = (search.all.tame[g] | search.all.odd[g]) & !done[g];
             let at = first + g * V::N;
             if done[g] == 0 {
@@ -236,7 +238,7 @@ impl Job<'_> {
                 self.memory.left.ids.extend(lanes.map(|lane| (at + lane) as u32));
             }
         }
-        found
+        true
     }
 
     /// A group's rays miss, until they are found to hit.
@@ -254,9 +256,9 @@ impl Job<'_> {
         }
         let mut traced = 0;
         for q in 0..SETS {
-            let here = groups >> (16 * q) & 0xffff;
+            let here = groups >> (SET * q) & 0xffff;
             if here != 0 && self.tile::<1, false, EXACT, COUNT>(&bundle.set(q), here) {
-                traced |= here << (16 * q);
+                traced |= here << (SET * q);
             }
         }
         traced

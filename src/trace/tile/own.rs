@@ -6,13 +6,13 @@ use glam::DVec3;
 use super::batch::{Batch, Planes};
 use super::bundle::Bundle;
 use super::exact::Exact;
-use super::groups::{Groups, NO_SLOT};
+use super::groups::{Group, Groups, NO_SLOT};
 use super::shapes;
 use super::{Mask, V, select};
 use crate::lanes::chosen::merge;
 use crate::lanes::past::store_past;
 use crate::lanes::words::{below, positions};
-use crate::lanes::{LaneMask, Lanes, each};
+use crate::lanes::{LaneMask, Lanes, dot, each};
 use crate::ray::{HitPacket, Hits, INVALID_ID};
 use crate::shape::{Block, Triangle};
 
@@ -71,7 +71,7 @@ pub fn pair<const ANY: bool, const MANY: bool>(
     i: usize,
     id: Id,
 ) -> Verdict {
-    let (inside, maybe, [e0, e1, e2]) = inside(groups, planes, g, i);
+    let (inside, maybe, edges) = inside(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
     let best = groups.of[g].inv_lo;
     let reached = inverse.cmp_le(groups.of[g].inv_hi) & best.cmp_le(inverse);
@@ -81,15 +81,20 @@ pub fn pair<const ANY: bool, const MANY: bool>(
     }
     let nearer = best.cmp_lt(inverse) | id.comes_first::<MANY>(groups, g);
     let hit = inside & reached & nearer;
-    groups.of[g].inv_lo = select(hit, inverse, best);
     id.name::<MANY>(groups, g, hit);
-    let own = |e: V, k: usize| e - V::splat(planes.eps[k][i]);
-    let (e0, e1, e2) = (own(e0, 0), own(e1, 1), own(e2, 2));
-    let weights = &mut groups.of[g].weights;
+    keep(groups, planes, g, i, hit, inverse, edges);
+    Verdict { hit: hit.any(), doubt }
+}
+
+/// Keeps the depth and the weights of a hit; `edges` are the edge functions.
+#[inline(always)]
+fn keep(groups: &mut Groups, planes: &Planes, g: usize, i: usize, hit: Mask, inverse: V, edges: [V; 3]) {
+    let [e0, e1, e2] = each(|k| edges[k] - V::splat(planes.eps[k][i]));
+    let Group { inv_lo, weights, .. } = &mut groups.of[g];
+    *inv_lo = select(hit, inverse, *inv_lo);
     weights[0] = select(hit, e1, weights[0]);
     weights[1] = select(hit, e2, weights[1]);
     weights[2] = select(hit, e0 + e1 + e2, weights[2]);
-    Verdict { hit: hit.any(), doubt }
 }
 
 /// One triangle against the rays of one group that share their end (any-hit).
@@ -112,31 +117,24 @@ pub fn pair_to_end(groups: &mut Groups, planes: &Planes, g: usize, i: usize) -> 
 /// they start on is told by the start; and so is how far ahead of it they hit.
 #[inline(always)]
 pub fn pair_ahead(groups: &mut Groups, planes: &Planes, g: usize, i: usize, id: Id) -> Verdict {
-    let (inside, maybe, [e0, e1, e2]) = inside(groups, planes, g, i);
+    let (inside, maybe, edges) = inside(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
     let best = groups.of[g].inv_lo;
     let ahead = -behind(groups, planes, g, i);
     let reached = V::constant(0.0).cmp_le(ahead) & best.cmp_le(inverse);
     let nearer = best.cmp_lt(inverse) | id.comes_first::<false>(groups, g);
     let hit = inside & reached & nearer;
-    groups.of[g].inv_lo = select(hit, inverse, best);
     groups.ahead[g] = select(hit, ahead * V::splat(planes.rcp[i]), groups.ahead[g]);
     id.name::<false>(groups, g, hit);
-    let own = |e: V, k: usize| e - V::splat(planes.eps[k][i]);
-    let (e0, e1, e2) = (own(e0, 0), own(e1, 1), own(e2, 2));
-    let weights = &mut groups.of[g].weights;
-    weights[0] = select(hit, e1, weights[0]);
-    weights[1] = select(hit, e2, weights[1]);
-    weights[2] = select(hit, e0 + e1 + e2, weights[2]);
+    keep(groups, planes, g, i, hit, inverse, edges);
     Verdict { hit: hit.any(), doubt: (maybe & reached).any() }
 }
 
 /// How far the segments of a group start behind a triangle's plane as seen from their common point; in some unit.
 #[inline(always)]
 fn behind(groups: &Groups, planes: &Planes, g: usize, i: usize) -> V {
-    let [x, y, z] = each(|a| groups.of[g].start[a] - V::splat(planes.side[a][i]));
-    let [nx, ny, nz] = each(|a| V::splat(planes.side[a + 3][i]));
-    nz.mul_add(z, ny.mul_add(y, nx * x))
+    let (normal, way) = planes.to_starts(i, &groups.of[g].start);
+    dot(normal, way)
 }
 
 /// [`pair`] where edges need more digits than f32 has: for a sliver, a triangle much smaller than a pixel, or rays that
@@ -186,7 +184,9 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
         return occlude(groups, g, hit);
     }
     groups.of[g].inv_lo = select(hit, inverse, best);
-    groups.ahead[g] = select(hit, ahead * V::splat(planes.rcp[i]), groups.ahead[g]);
+    if groups.is_behind {
+        groups.ahead[g] = select(hit, ahead * V::splat(planes.rcp[i]), groups.ahead[g]);
+    }
     id.name::<MANY>(groups, g, hit);
     groups.of[g].weights = weights.map(V::new);
     hit.any()
@@ -223,6 +223,13 @@ fn inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> (Mask, Mask, 
     let least = edges[0].fast_min(edges[1]).fast_min(edges[2]);
     let sure = V::splat(planes.sure[i]);
     (sure.cmp_le(least), V::constant(0.0).cmp_le(least) & least.cmp_lt(sure), edges)
+}
+
+/// Whether some ray of a group is not certainly outside triangle `i`.
+#[inline(always)]
+pub fn may_be_inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> bool {
+    let (inside, doubtful, _) = inside(groups, planes, g, i);
+    (inside | doubtful).any()
 }
 
 /// Lanes that found something want nothing any more.

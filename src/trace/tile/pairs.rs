@@ -4,7 +4,7 @@ use super::batch::{BATCH, Planes};
 use super::bundle::Shared;
 use super::exact::{self, Exact, certain_pair};
 use super::groups::Groups;
-use super::own::{self, Id, Verdict, own_depth, pair, pair_ahead, pair_doubtful, pair_to_end};
+use super::own::{self, Id, Verdict, may_be_inside, own_depth, pair, pair_ahead, pair_doubtful, pair_to_end};
 use super::{GROUPS, Memory, SET, V};
 use crate::lanes::words::list_bits;
 use crate::lanes::{LaneMask, Lanes, each};
@@ -72,8 +72,11 @@ fn test<const ANY: bool, const EXACT: bool, const MANY: bool, const BEHIND: bool
                 exact::decide::<ANY>(groups, exact, g, batch.id[i], doubtful);
             }
         } else if (planes.wild | planes.unsteady) >> i & 1 != 0 {
-            found += usize::from(if planes.wild >> i & 1 != 0 {
+            let flat = BEHIND && planes.flat >> i & 1 != 0;
+            found += usize::from(if planes.wild >> i & 1 != 0 || flat && may_be_inside(groups, planes, g, i) {
                 own::decide::<ANY, MANY>(groups, exact, g, batch, i)
+            } else if flat {
+                false
             } else {
                 pair_doubtful::<ANY, MANY>(groups, planes, g, i, id, to_end)
             });
