@@ -77,12 +77,12 @@ impl<S: Real> Tree<S> {
 /// Deterministic: the same input gives the same tree on any number of threads.
 pub fn build<S: Real>(boxes: &[Aabb<S>], classes: &[u8], settings: impl Into<BuildSettings>) -> (Tree<S>, Vec<Leaf>) {
     assert_eq!(boxes.len(), classes.len());
-    let BuildSettings { preset, leaf } = settings.into();
-    let nodes = binary::build(boxes, preset);
+    let settings = settings.into();
+    let nodes = binary::build(boxes, settings);
     if nodes.is_empty() {
         return (Tree::empty(), Vec::new());
     }
-    let plan = Plan::new(&nodes, classes, leaf);
+    let plan = Plan::new(&nodes, classes, settings.leaf);
     let mut emission =
         Emission { binary: &nodes, plan: &plan, nodes: Vec::new(), leaves: Vec::new(), blocks: [0; 256] };
     let depth = emission.run();
@@ -104,6 +104,7 @@ impl<S: Real> Emission<'_, S> {
         let mut depth = 0;
         // Binary node to open, where its index goes, its depth.
         let mut stack = vec![(0usize, None, 1u32)];
+        let (mut children, mut by_area) = (Vec::with_capacity(WIDTH), Vec::with_capacity(WIDTH));
         while let Some((source, slot, level)) = stack.pop() {
             depth = depth.max(level);
             let id = self.nodes.len();
@@ -112,22 +113,26 @@ impl<S: Real> Emission<'_, S> {
                 parent.child[slot] = id as u32;
             }
             self.nodes.push(Node::empty());
-            let mut children = match self.plan.is_leaf(self.binary, source) {
-                true => vec![source],
-                false => self.plan.children(self.binary, source),
-            };
+            if self.plan.is_leaf(self.binary, source) {
+                children.clear();
+                children.push(source);
+            } else {
+                self.plan.children(self.binary, source, &mut children);
+            }
             // Large children first: the order in which any-hit rays look.
-            children.sort_by(|&a, &b| self.binary[b].bounds.half_area().total_cmp(&self.binary[a].bounds.half_area()));
-            let mut inner = Vec::new();
-            for (slot, &child) in children.iter().enumerate() {
+            by_area.clear();
+            by_area.extend(children.iter().map(|&child| (self.binary[child].bounds.half_area(), child)));
+            by_area.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let first = stack.len();
+            for (slot, &(_, child)) in by_area.iter().enumerate() {
                 let leaf = self.plan.is_leaf(self.binary, child);
                 let reference = if leaf { self.leaf(child) } else { Child::ROOT };
                 self.nodes[id].push(&self.binary[child].bounds, reference);
                 if !leaf {
-                    inner.push((child, Some((id, slot)), level + 1));
+                    stack.push((child, Some((id, slot)), level + 1));
                 }
             }
-            stack.extend(inner.into_iter().rev());
+            stack[first..].reverse();
         }
         depth
     }

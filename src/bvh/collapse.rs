@@ -2,9 +2,10 @@
 //!
 //! Source: Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", HPG
 //! 2017, section 3: for every binary node and every i <= 8, the cheapest forest of at most i wide subtrees that
-//! covers its primitives. Costs: an inner node 1, a leaf 1 per started block of eight, both times their area.
+//! covers its primitives.
 
 use super::binary::Binary;
+use super::cost::Cost;
 use super::node::{LEAF_PRIMS, WIDTH};
 use crate::lanes::Real;
 use crate::math::Aabb;
@@ -51,24 +52,25 @@ impl Plan {
             (hi * 0.5 - lo * 0.5).max_element()
         });
         let scale = if extent > 0.0 { (1.0 / extent).min(f64::MAX) } else { 0.0 };
+        let model = Cost::new(nodes.first().map_or(0.0, |n| relative_area(&n.bounds, scale)));
         for i in (0..nodes.len()).rev() {
             let area = relative_area(&nodes[i].bounds, scale);
             match nodes[i].children() {
                 None => {
                     plan.classes[i] = class_of[nodes[i].left as usize];
-                    costs[i] = [area; WIDTH];
+                    costs[i] = [model.leaf(area, 1); WIDTH];
                 }
                 Some([l, r]) => {
                     plan.counts[i] = plan.counts[l] + plan.counts[r];
                     plan.classes[i] = if plan.classes[l] == plan.classes[r] { plan.classes[l] } else { MIXED };
-                    costs[i] = plan.inner(i, area, &costs[l], &costs[r]);
+                    costs[i] = plan.inner(i, area, model, &costs[l], &costs[r]);
                 }
             }
         }
         plan
     }
 
-    fn inner(&mut self, i: usize, area: f32, left: &[f32; WIDTH], right: &[f32; WIDTH]) -> [f32; WIDTH] {
+    fn inner(&mut self, i: usize, area: f32, model: Cost, left: &[f32; WIDTH], right: &[f32; WIDTH]) -> [f32; WIDTH] {
         // forests[k]: best split into k + 1 trees, at least one on either side.
         let mut forests = [(f32::INFINITY, 0u8); WIDTH];
         for total in 2..=WIDTH {
@@ -81,10 +83,10 @@ impl Plan {
         }
         let fits = self.counts[i] <= self.most && self.classes[i] != MIXED;
         let (best_forest, on_left) = forests[WIDTH - 1];
-        let as_node = area + best_forest;
-        let leaf = fits && area <= as_node;
+        let (as_node, as_leaf) = (model.node(area) + best_forest, model.leaf(area, self.counts[i]));
+        let leaf = fits && as_leaf <= as_node;
         self.decisions[i][0] = if leaf { 0 } else { on_left };
-        let mut costs = [if leaf { area } else { as_node }; WIDTH];
+        let mut costs = [if leaf { as_leaf } else { as_node }; WIDTH];
         for k in 1..WIDTH {
             let (cost, on_left) = forests[k];
             // Where areas vanish and everything costs the same, a wide node is flatter than a chain.
@@ -107,9 +109,9 @@ impl Plan {
         self.classes[node]
     }
 
-    /// The binary nodes that become the children of the inner wide node made from `node`.
-    pub fn children<S>(&self, nodes: &[Binary<S>], node: usize) -> Vec<usize> {
-        let mut found = Vec::with_capacity(WIDTH);
+    /// Puts the binary nodes that become the children of the inner wide node made from `node` into `found`.
+    pub fn children<S>(&self, nodes: &[Binary<S>], node: usize, found: &mut Vec<usize>) {
+        found.clear();
         let on_left = usize::from(self.decisions[node][0]);
         let [l, r] = nodes[node].children().expect("an inner node");
         let mut stack = vec![(r, WIDTH - on_left), (l, on_left)];
@@ -126,7 +128,6 @@ impl Plan {
                 _ => found.push(node),
             }
         }
-        found
     }
 
     /// Primitives below `node`, ascending.

@@ -1,4 +1,4 @@
-//! Bounding volume hierarchies: build (obvhs), collapse to eight children, flat layout, validation, cost.
+//! Bounding volume hierarchies: build, refinement (obvhs), collapse to eight children, flat layout, validation, cost.
 //!
 //! The tree knows boxes and leaf classes, not shapes: the caller brings one box and one class number per primitive
 //! and stores each leaf's primitives (at most eight, of one class) as one block of that class.
@@ -7,8 +7,11 @@ mod binary;
 mod build;
 mod bundle;
 mod collapse;
+mod cost;
 mod node;
 mod quality;
+mod refine;
+mod topdown;
 
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,8 @@
 //! Trees over awkward boxes are valid, bounded in depth, and do not depend on the number of threads.
 
+use super::cost::Cost;
+use super::refine::{Place, Refined};
+use super::topdown::{self, Part, Rules, Span};
 use super::*;
 use crate::math::Aabb;
 
@@ -47,7 +50,8 @@ fn every_preset_and_every_small_count() {
 
 #[test]
 fn leaves_are_as_small_as_asked_for() {
-    let boxes = soup(3000, 21);
+    // Nothing is gained by keeping such boxes apart.
+    let boxes: Vec<_> = soup(3000, 21).iter().map(|b| Aabb { lo: b.lo, hi: b.lo.map(|x| x + 5.0) }).collect();
     let classes = vec![0; boxes.len()];
     let nodes: Vec<usize> = (1..=LEAF_PRIMS)
         .map(|leaf| {
@@ -88,7 +92,7 @@ fn awkward_boxes_stay_shallow() {
 
 #[test]
 fn the_tree_does_not_depend_on_threads() {
-    let boxes = soup(20_000, 11);
+    let boxes = soup(70_000, 11);
     let classes = vec![0; boxes.len()];
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -125,9 +129,192 @@ fn validation_finds_planted_faults() {
 }
 
 #[test]
-fn a_grid_costs_what_the_formula_says() {
-    // Eight unit boxes in a row, 8 x 1 x 1: one node, one leaf: 1 for the root, 1 for the leaf of the same area.
-    let row: Vec<_> = (0..8).map(|i| Aabb { lo: [i as f32, 0.0, 0.0], hi: [i as f32 + 1.0, 1.0, 1.0] }).collect();
-    let q = check(&row, &[0; 8], Preset::Balanced).quality();
+fn what_costs_less_is_chosen() {
+    // Eight boxes at one place: one leaf, which costs 1 for the root and 1 for itself.
+    let heap = [Aabb { lo: [0.0f32; 3], hi: [1.0; 3] }; 8];
+    let q = check(&heap, &[0; 8], Preset::Balanced).quality();
     assert_eq!((q.nodes, q.leaves, q.sah_cost), (1, 1, 2.0));
+    // Eight unit cubes in a row, 100 apart: a leaf for each, 3 of the half area of 701 x 1 x 1.
+    let row: Vec<_> =
+        (0..8).map(|i| 100.0 * i as f32).map(|x| Aabb { lo: [x, 0.0, 0.0], hi: [x + 1.0, 1.0, 1.0] }).collect();
+    let q = check(&row, &[0; 8], Preset::Balanced).quality();
+    assert_eq!((q.nodes, q.leaves), (1, 8));
+    assert!((q.sah_cost - (1.0 + 8.0 * 3.0 / 1403.0)).abs() < 1e-12);
+}
+
+#[test]
+fn walls_are_kept_apart_from_what_is_in_the_room() {
+    // Two triangles each of floor and ceiling, and a hundred small boxes between them: no leaf reaches from one to the other.
+    let wall = |y: f32| Aabb { lo: [0.0, y, 0.0], hi: [1.0, y, 1.0] };
+    let mut room = [wall(0.0), wall(0.0), wall(1.0), wall(1.0)].to_vec();
+    room.extend(
+        soup(100, 55).iter().map(|b| Aabb { lo: b.lo.map(|x| 0.3 + 0.3 * x), hi: b.hi.map(|x| 0.3 + 0.3 * x) }),
+    );
+    for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
+        let (_, leaves) = build(&room, &vec![0; room.len()], preset);
+        let tallest = leaves.iter().map(|leaf| {
+            let all: Vec<_> = leaf.prims.iter().map(|&p| room[p as usize]).collect();
+            join(&all).hi[1] - join(&all).lo[1]
+        });
+        assert!(tallest.fold(0.0, f32::max) < 0.3);
+    }
+}
+
+/// Primitives in a block.
+const BLOCK: usize = 4;
+
+/// Parts in their new order, nodes, parts of the leaves.
+type Grown = (Vec<Part>, Vec<topdown::Node>, Vec<std::ops::Range<usize>>);
+
+/// Builds the binary tree of some boxes and checks it: exact boxes and counts, each part in one leaf. Leaves come in order.
+fn grown(boxes: &[Aabb<f32>]) -> Grown {
+    grown_to(boxes, 64)
+}
+
+fn grown_to(boxes: &[Aabb<f32>], deepest: usize) -> Grown {
+    let mut parts: Vec<Part> =
+        boxes.iter().zip(0..).map(|(b, prim)| Part { bounds: Span::new(b.lo, b.hi), prim }).collect();
+    let cost = Cost::new(join(boxes).half_area() as f32);
+    let nodes = topdown::build(&mut parts, Rules { block: BLOCK, least: 1e-6, deepest, cost });
+    let mut prims: Vec<u32> = parts.iter().map(|p| p.prim).collect();
+    prims.sort_unstable();
+    assert!(prims.into_iter().eq(0..boxes.len() as u32));
+    let mut leaves = Vec::new();
+    let mut stack = vec![0];
+    while let Some(at) = stack.pop() {
+        let node: &topdown::Node = &nodes[at];
+        if node.leaf {
+            let first = node.at as usize;
+            leaves.push(first..first + node.count as usize);
+        } else {
+            let children = [at + 1, node.at as usize];
+            assert_eq!(node.count, children.iter().map(|&c| nodes[c].count).sum::<u32>());
+            assert_eq!(node.bounds.corners(), union(children.map(|c| nodes[c].bounds.corners())));
+            stack.extend(children.into_iter().rev());
+        }
+    }
+    assert_eq!((leaves[0].start, leaves.last().unwrap().end), (0, parts.len()));
+    assert!(leaves.windows(2).all(|l| l[0].end == l[1].start));
+    for leaf in &leaves {
+        assert!(leaf.len() == 1 || leaf.len() > BLOCK, "a leaf of {}", leaf.len());
+    }
+    (parts, nodes, leaves)
+}
+
+fn join(boxes: &[Aabb<f32>]) -> Aabb<f32> {
+    boxes.iter().fold(Aabb::EMPTY, |all, b| all.union(b))
+}
+
+fn union([a, b]: [[[f32; 3]; 2]; 2]) -> [[f32; 3]; 2] {
+    [[0, 1, 2].map(|i| a[0][i].min(b[0][i])), [0, 1, 2].map(|i| a[1][i].max(b[1][i]))]
+}
+
+#[test]
+fn every_part_is_in_one_leaf_of_its_own() {
+    for n in (1..60).chain([500, 9000]) {
+        let (_, _, leaves) = grown(&soup(n, n as u64));
+        assert_eq!(leaves.len(), n);
+    }
+}
+
+#[test]
+fn paths_end_soon_where_they_are_told_to() {
+    // Halving 1000 parts takes ten nodes more and a leaf.
+    assert!(depth(&soup(1000, 3), 64) > 12);
+    assert!((10..=13).contains(&depth(&soup(1000, 3), 1)));
+}
+
+fn depth(boxes: &[Aabb<f32>], deepest: usize) -> usize {
+    let (_, nodes, _) = grown_to(boxes, deepest);
+    let (mut most, mut stack) = (0, vec![(0, 1)]);
+    while let Some((at, depth)) = stack.pop() {
+        most = most.max(depth);
+        if !nodes[at].leaf {
+            stack.extend([at + 1, nodes[at].at as usize].map(|child| (child, depth + 1)));
+        }
+    }
+    most
+}
+
+#[test]
+fn parts_with_one_centre_are_halved_or_left_together() {
+    // Pairs of a square's two triangles have equal boxes.
+    let pairs: Vec<_> = soup(300, 31).into_iter().flat_map(|b| [b, b]).collect();
+    assert_eq!(grown(&pairs).2.len(), pairs.len());
+    let unit = Aabb { lo: [0.0f32; 3], hi: [1.0; 3] };
+    assert_eq!(grown(&[unit; 4]).2.len(), 4, "a block");
+    assert_eq!(grown(&[unit; 5]).2.len(), 1, "more than a block");
+}
+
+#[test]
+fn the_first_split_is_the_cheapest_of_all_planes() {
+    for n in [5, 12] {
+        let boxes = soup(n, 40 + n as u64);
+        let (_, nodes, _) = grown(&boxes);
+        let model = Cost::new(join(&boxes).half_area() as f32);
+        let cost = |of: &[Aabb<f32>]| model.guess(join(of).half_area() as f32, of.len() as u32, BLOCK);
+        let planes = (0..3).flat_map(|axis| {
+            let mut sorted = boxes.clone();
+            sorted.sort_by(|a, b| (a.lo[axis] + a.hi[axis]).total_cmp(&(b.lo[axis] + b.hi[axis])));
+            (1..n).map(move |left| cost(&sorted[..left]) + cost(&sorted[left..])).collect::<Vec<_>>()
+        });
+        let least = planes.fold(f32::INFINITY, f32::min);
+        let side = |at: usize| model.guess(nodes[at].bounds.area(), nodes[at].count, BLOCK);
+        let chosen = side(1) + side(nodes[0].at as usize);
+        assert!((chosen - least).abs() < 1e-5 * least, "{chosen} instead of {least}");
+    }
+}
+
+#[test]
+fn refinement_moves_subtrees_to_where_they_cost_less() {
+    let mut r = Random(77);
+    // Long thin boxes in all directions: what splits by planes are worst at.
+    let boxes: Vec<_> = (0..4000)
+        .map(|_| {
+            let (lo, size) = ([0; 3].map(|_| r.next() as f32), [0; 3].map(|_| r.next().powi(6) as f32));
+            Aabb { lo, hi: [0, 1, 2].map(|i| lo[i] + size[i]) }
+        })
+        .collect();
+    let (_, nodes, _) = grown(&boxes);
+    assert!(Refined::new(&nodes, 1, &[]).is_none());
+    for whole in [1, BLOCK as u32] {
+        let kept = |at: usize| nodes[at].leaf || nodes[at].count <= whole;
+        let (mut before, mut clusters, mut stack) = (0.0, Vec::new(), vec![0]);
+        while let Some(at) = stack.pop() {
+            if kept(at) {
+                clusters.push(at);
+            } else {
+                before += nodes[at].bounds.area();
+                stack.extend([at + 1, nodes[at].at as usize]);
+            }
+        }
+        let refined = Refined::new(&nodes, whole, &[1.0, 0.5]).unwrap();
+        let (mut after, mut found) = (0.0, Vec::new());
+        refined_area(&refined, &nodes, 0, &mut after, &mut found);
+        clusters.sort_unstable();
+        found.sort_unstable();
+        assert_eq!(clusters, found, "each cluster once");
+        assert!(after < 0.95 * before, "{before} to {after}");
+    }
+}
+
+/// Sums up the areas of inner nodes below a place and collects what is kept; returns the box of all.
+fn refined_area(
+    tree: &Refined,
+    nodes: &[topdown::Node],
+    at: usize,
+    area: &mut f32,
+    kept: &mut Vec<usize>,
+) -> [[f32; 3]; 2] {
+    match tree.place(at) {
+        Place::Kept(node) => {
+            kept.push(node);
+            nodes[node].bounds.corners()
+        }
+        Place::Inner(one, other) => {
+            let all = union([one, other].map(|at| refined_area(tree, nodes, at, area, kept)));
+            *area += Span::new(all[0], all[1]).area();
+            all
+        }
+    }
 }

@@ -211,10 +211,11 @@ impl<S: Real> Primitives<S> {
 
     fn build(mut self, settings: BuildSettings) -> Object<S> {
         let (tree, leaves) = bvh::build(&self.boxes, &self.classes, settings);
+        let blocks = |class: Class| leaves.iter().filter(|leaf| leaf.class == class as u8).count();
         let mut object = Object {
             tree,
-            triangles: Vec::new(),
-            spheres: Vec::new(),
+            triangles: Vec::with_capacity(blocks(Class::Triangle)),
+            spheres: Vec::with_capacity(blocks(Class::WorldSphere)),
             placed: Default::default(),
             unbounded: Vec::new(),
             solids: std::mem::take(&mut self.solids),
