@@ -11,7 +11,7 @@ use crate::math::Aabb;
 pub enum Preset {
     /// Quick build, slower rays.
     Fast,
-    /// The default: rays within a few per cent of the best at a tenth of its time.
+    /// The default: rays within two per cent of the best at a third of its time.
     #[default]
     Balanced,
     /// Slow build, fastest rays.
