@@ -300,7 +300,7 @@ fn eyes_in_the_planes_of_triangles() {
     turned.positions.iter_mut().for_each(|p| *p = (turn * *p).as_vec3().as_dvec3());
     for (world, turn) in [(compile(vec![blocks]), DQuat::IDENTITY), (compile(vec![turned]), turn)] {
         let mut hits = 0;
-        for case in 0..30 {
+        for case in 0..18 {
             let eye = (7.0 * r.in_cube()).round();
             let mut target = 4.0 * r.in_cube();
             target[case % 3] = eye[case % 3];
@@ -310,7 +310,7 @@ fn eyes_in_the_planes_of_triangles() {
             hits += thrown.live_count();
             assert_eq!(differences(&world, &thrown), (0, 0), "mirror rays of case {case}");
         }
-        assert!(hits > 30_000, "{hits}");
+        assert!(hits > 15_000, "{hits}");
     }
 }
 

@@ -95,7 +95,7 @@ fn frames_maps_and_orbits() {
     let script = "blocks 8\nframe 0\nsave frame.exr\nheat nodes\nwait\nsave nodes.exr\nheat lanes\nwait\nsave lanes.exr\n\
         heat off\nspin 3 5 0\n";
     let dir = folder(script);
-    let said = view(dir.path(), "builtin:gallery --size 200x120 --threads 1");
+    let said = view(dir.path(), "builtin:sphere-flake --size 200x120 --threads 1");
     let commands: Vec<&str> = said.iter().map(|o| o["command"].as_str().unwrap()).collect();
     assert_eq!(commands, ["frame", "wait", "wait", "spin"]);
     assert_eq!((&said[0]["complete"], &said[3]["complete_frames"]), (&false.into(), &3.into()));
