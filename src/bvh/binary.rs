@@ -8,51 +8,93 @@ use rayon::prelude::*;
 
 use super::build::{BuildSettings, Preset};
 use super::cost::Cost;
+use super::node::LEAF_PRIMS;
 use super::refine::{Place, Refined};
 use super::topdown::{self, Part, Rules, Span};
 use crate::lanes::Real;
 use crate::math::Aabb;
 
-/// Marks a leaf in [`Binary::right`].
-const LEAF: u32 = u32::MAX;
-
-/// A binary node: an inner node with two children or a leaf with one primitive. Children follow their parents.
+/// A binary node: an inner node with two children or a leaf. Children follow their parents.
 #[derive(Clone, Copy, Debug)]
-pub struct Binary<S> {
+pub struct Node<S> {
     /// Exact union of the primitives' boxes.
     pub bounds: Aabb<S>,
-    /// Left child, or primitive of a leaf.
-    pub left: u32,
-    /// Right child, or a mark.
+    /// Left child, or where a leaf's primitives begin in the tree's list.
+    left: u32,
+    /// Right child, or all ones but for the number of a leaf's primitives.
     right: u32,
 }
 
-impl<S> Binary<S> {
+impl<S> Node<S> {
     /// The two children, or `None` for a leaf.
+    #[inline(always)]
     pub fn children(&self) -> Option<[usize; 2]> {
-        (self.right != LEAF).then_some([self.left as usize, self.right as usize])
+        (self.right < !(LEAF_PRIMS as u32)).then_some([self.left as usize, self.right as usize])
     }
 }
 
-/// Builds a binary tree over the primitives `0..boxes.len()`; `boxes` must be finite and not empty boxes.
-/// The root is node 0; no nodes for no boxes.
-pub fn build<S: Real>(boxes: &[Aabb<S>], settings: BuildSettings) -> Vec<Binary<S>> {
-    let mut nodes = Vec::with_capacity((2 * boxes.len()).saturating_sub(1));
+/// A binary tree: node 0 is the root; no nodes for no boxes.
+#[derive(Clone, Debug)]
+pub struct Binary<S> {
+    /// Nodes.
+    pub nodes: Vec<Node<S>>,
+    /// Primitives of leaves, one after the other.
+    prims: Vec<u32>,
+}
+
+impl<S> Binary<S> {
+    /// Primitives of a leaf: one, or some of one class that nothing can make cheaper than one leaf.
+    #[inline(always)]
+    pub fn prims(&self, leaf: usize) -> &[u32] {
+        let Node { left, right, .. } = self.nodes[leaf];
+        &self.prims[left as usize..][..!right as usize]
+    }
+
+    fn append(&mut self, slot: Slot, left: u32, right: u32) -> usize
+    where
+        S: Real,
+    {
+        let id = self.nodes.len();
+        self.nodes.push(Node { bounds: Aabb::EMPTY, left, right });
+        match slot {
+            Some((parent, 0)) => self.nodes[parent].left = id as u32,
+            Some((parent, _)) => self.nodes[parent].right = id as u32,
+            None => {}
+        }
+        id
+    }
+
+    fn append_leaf(&mut self, slot: Slot, parts: &[Part])
+    where
+        S: Real,
+    {
+        self.append(slot, self.prims.len() as u32, !(parts.len() as u32));
+        self.prims.extend(parts.iter().map(|part| part.prim));
+    }
+}
+
+/// Where a subtree's root goes: node and side.
+type Slot = Option<(usize, usize)>;
+
+/// Builds a binary tree over the primitives `0..boxes.len()`; `boxes` must be finite and not empty boxes, `classes` are those of
+/// the primitives.
+pub fn build<S: Real>(boxes: &[Aabb<S>], classes: &[u8], settings: BuildSettings) -> Binary<S> {
+    let mut tree = Binary { nodes: Vec::new(), prims: Vec::with_capacity(boxes.len()) };
     if !boxes.is_empty() {
         let prims: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut todo = vec![(prims, None)];
         while let Some((prims, slot)) = todo.pop() {
-            plant(boxes, prims, slot, settings, &mut nodes, &mut todo);
+            plant((boxes, classes), prims, slot, settings, &mut tree, &mut todo);
         }
         // Children follow their parents, so one backward sweep sees them first.
-        for i in (0..nodes.len()).rev() {
-            nodes[i].bounds = match nodes[i].children() {
-                Some([l, r]) => nodes[l].bounds.union(&nodes[r].bounds),
-                None => boxes[nodes[i].left as usize],
+        for i in (0..tree.nodes.len()).rev() {
+            tree.nodes[i].bounds = match tree.nodes[i].children() {
+                Some([l, r]) => tree.nodes[l].bounds.union(&tree.nodes[r].bounds),
+                None => tree.prims(i).iter().fold(Aabb::EMPTY, |all, &p| all.union(&boxes[p as usize])),
             };
         }
     }
-    nodes
+    tree
 }
 
 /// Centres (twice) that differ less than this in a frame, which is two units wide, are left to a frame of their own: what is
@@ -75,63 +117,50 @@ const DEEPEST: usize = 64;
 /// Boxes that one thread brings into a frame in one go.
 const FRAMED: usize = 4096;
 
-/// Where a subtree's root goes: node and side.
-type Slot = Option<(usize, usize)>;
-
-fn append<S: Real>(nodes: &mut Vec<Binary<S>>, slot: Slot, left: u32) -> usize {
-    let id = nodes.len();
-    nodes.push(Binary { bounds: Aabb::EMPTY, left, right: LEAF });
-    match slot {
-        Some((parent, 0)) => nodes[parent].left = id as u32,
-        Some((parent, _)) => nodes[parent].right = id as u32,
-        None => {}
-    }
-    id
-}
-
 /// Appends the subtree over `prims`; what needs a frame of its own is put on `todo`.
 fn plant<S: Real>(
-    boxes: &[Aabb<S>],
+    (boxes, classes): (&[Aabb<S>], &[u8]),
     mut prims: Vec<u32>,
     slot: Slot,
     settings: BuildSettings,
-    nodes: &mut Vec<Binary<S>>,
+    tree: &mut Binary<S>,
     todo: &mut Vec<(Vec<u32>, Slot)>,
 ) {
     let (mut parts, area) = frame(boxes, &prims);
     let rules = Rules { block: settings.leaf, least: LEAST, deepest: DEEPEST, cost: Cost::new(area) };
-    let tree = topdown::build(&mut parts, rules);
-    if prims.len() > 1 && tree[0].leaf {
+    let grown = topdown::build(&mut parts, rules);
+    if prims.len() > 1 && grown[0].leaf {
         // Nothing tells these boxes apart but their size: halve by it.
         prims.sort_by(|&a, &b| {
             let area = |p: u32| boxes[p as usize].half_area();
             area(a).total_cmp(&area(b)).then(a.cmp(&b))
         });
-        let id = append(nodes, slot, 0);
-        nodes[id].right = 0;
+        let id = tree.append(slot, 0, 0);
         let upper = prims.split_off(prims.len() / 2);
         todo.push((prims, Some((id, 0))));
         todo.push((upper, Some((id, 1))));
         return;
     }
-    let refined = Refined::new(&tree, settings.leaf as u32, &rounds(settings.preset));
+    let refined = Refined::new(&grown, settings.leaf as u32, &rounds(settings.preset));
     let place = |at: usize| refined.as_ref().map_or(Place::Kept(at), |r| r.place(at));
     let mut stack = vec![(place(0), slot)];
     while let Some((here, slot)) = stack.pop() {
         let children = match here {
             Place::Inner(one, other) => [place(one), place(other)],
-            Place::Kept(at) if tree[at].leaf => {
-                let first = tree[at].at as usize;
-                match &parts[first..first + tree[at].count as usize] {
-                    [part] => drop(append(nodes, slot, part.prim)),
-                    many => todo.push((many.iter().map(|part| part.prim).collect(), slot)),
+            Place::Kept(at) if grown[at].leaf => {
+                let first = grown[at].at as usize;
+                let parts = &parts[first..first + grown[at].count as usize];
+                let class = |part: &Part| classes[part.prim as usize];
+                if parts.len() <= settings.leaf && parts.iter().all(|part| class(part) == class(&parts[0])) {
+                    tree.append_leaf(slot, parts);
+                } else {
+                    todo.push((parts.iter().map(|part| part.prim).collect(), slot));
                 }
                 continue;
             }
-            Place::Kept(at) => [Place::Kept(at + 1), Place::Kept(tree[at].at as usize)],
+            Place::Kept(at) => [Place::Kept(at + 1), Place::Kept(grown[at].at as usize)],
         };
-        let id = append(nodes, slot, 0);
-        nodes[id].right = 0;
+        let id = tree.append(slot, 0, 0);
         stack.push((children[1], Some((id, 1))));
         stack.push((children[0], Some((id, 0))));
     }

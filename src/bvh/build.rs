@@ -1,6 +1,6 @@
 //! Building a tree: binary build, collapse, depth-first emission.
 
-use super::binary;
+use super::binary::{self, Binary};
 use super::collapse::Plan;
 use super::node::{Child, LEAF_PRIMS, Node, WIDTH};
 use crate::lanes::Real;
@@ -78,20 +78,20 @@ impl<S: Real> Tree<S> {
 pub fn build<S: Real>(boxes: &[Aabb<S>], classes: &[u8], settings: impl Into<BuildSettings>) -> (Tree<S>, Vec<Leaf>) {
     assert_eq!(boxes.len(), classes.len());
     let settings = settings.into();
-    let nodes = binary::build(boxes, settings);
-    if nodes.is_empty() {
+    let binary = binary::build(boxes, classes, settings);
+    if binary.nodes.is_empty() {
         return (Tree::empty(), Vec::new());
     }
-    let plan = Plan::new(&nodes, classes, settings.leaf);
+    let plan = Plan::new(&binary, classes, settings.leaf);
     let mut emission =
-        Emission { binary: &nodes, plan: &plan, nodes: Vec::new(), leaves: Vec::new(), blocks: [0; 256] };
+        Emission { binary: &binary, plan: &plan, nodes: Vec::new(), leaves: Vec::new(), blocks: [0; 256] };
     let depth = emission.run();
-    let tree = Tree { nodes: emission.nodes, depth, bounds: nodes[0].bounds };
+    let tree = Tree { nodes: emission.nodes, depth, bounds: binary.nodes[0].bounds };
     (tree, emission.leaves)
 }
 
 struct Emission<'a, S> {
-    binary: &'a [binary::Binary<S>],
+    binary: &'a Binary<S>,
     plan: &'a Plan,
     nodes: Vec<Node<S>>,
     leaves: Vec<Leaf>,
@@ -121,13 +121,13 @@ impl<S: Real> Emission<'_, S> {
             }
             // Large children first: the order in which any-hit rays look.
             by_area.clear();
-            by_area.extend(children.iter().map(|&child| (self.binary[child].bounds.half_area(), child)));
+            by_area.extend(children.iter().map(|&child| (self.binary.nodes[child].bounds.half_area(), child)));
             by_area.sort_by(|a, b| b.0.total_cmp(&a.0));
             let first = stack.len();
             for (slot, &(_, child)) in by_area.iter().enumerate() {
                 let leaf = self.plan.is_leaf(self.binary, child);
                 let reference = if leaf { self.leaf(child) } else { Child::ROOT };
-                self.nodes[id].push(&self.binary[child].bounds, reference);
+                self.nodes[id].push(&self.binary.nodes[child].bounds, reference);
                 if !leaf {
                     stack.push((child, Some((id, slot)), level + 1));
                 }

@@ -36,9 +36,10 @@ fn relative_area<S: Real>(bounds: &Aabb<S>, scale: f64) -> f32 {
 const MIXED: u8 = u8::MAX;
 
 impl Plan {
-    /// Plans the collapse of `nodes`, whose leaves are primitives with the given classes, to leaves of `most` primitives
+    /// Plans the collapse of `tree`, whose primitives have the given classes, to leaves of `most` primitives
     /// (1 to [`LEAF_PRIMS`]).
-    pub fn new<S: Real>(nodes: &[Binary<S>], class_of: &[u8], most: usize) -> Self {
+    pub fn new<S: Real>(tree: &Binary<S>, class_of: &[u8], most: usize) -> Self {
+        let nodes = &tree.nodes;
         let mut plan = Self {
             decisions: vec![[0; WIDTH]; nodes.len()],
             counts: vec![1; nodes.len()],
@@ -57,8 +58,10 @@ impl Plan {
             let area = relative_area(&nodes[i].bounds, scale);
             match nodes[i].children() {
                 None => {
-                    plan.classes[i] = class_of[nodes[i].left as usize];
-                    costs[i] = [model.leaf(area, 1); WIDTH];
+                    let prims = tree.prims(i);
+                    plan.classes[i] = class_of[prims[0] as usize];
+                    plan.counts[i] = prims.len() as u32;
+                    costs[i] = [model.leaf(area, plan.counts[i]); WIDTH];
                 }
                 Some([l, r]) => {
                     plan.counts[i] = plan.counts[l] + plan.counts[r];
@@ -100,8 +103,8 @@ impl Plan {
     }
 
     /// Whether `node`, as one tree, is a leaf.
-    pub fn is_leaf<S>(&self, nodes: &[Binary<S>], node: usize) -> bool {
-        nodes[node].children().is_none() || self.decisions[node][0] == 0
+    pub fn is_leaf<S>(&self, tree: &Binary<S>, node: usize) -> bool {
+        tree.nodes[node].children().is_none() || self.decisions[node][0] == 0
     }
 
     /// Class of a leaf.
@@ -110,16 +113,16 @@ impl Plan {
     }
 
     /// Puts the binary nodes that become the children of the inner wide node made from `node` into `found`.
-    pub fn children<S>(&self, nodes: &[Binary<S>], node: usize, found: &mut Vec<usize>) {
+    pub fn children<S>(&self, tree: &Binary<S>, node: usize, found: &mut Vec<usize>) {
         found.clear();
         let on_left = usize::from(self.decisions[node][0]);
-        let [l, r] = nodes[node].children().expect("an inner node");
+        let [l, r] = tree.nodes[node].children().expect("an inner node");
         let mut stack = vec![(r, WIDTH - on_left), (l, on_left)];
         while let Some((node, mut trees)) = stack.pop() {
             while trees > 1 && self.decisions[node][trees - 1] == 0 {
                 trees -= 1;
             }
-            match nodes[node].children() {
+            match tree.nodes[node].children() {
                 Some([l, r]) if trees > 1 => {
                     let on_left = usize::from(self.decisions[node][trees - 1]);
                     stack.push((r, trees - on_left));
@@ -131,13 +134,13 @@ impl Plan {
     }
 
     /// Primitives below `node`, ascending.
-    pub fn prims<S>(&self, nodes: &[Binary<S>], node: usize) -> Vec<u32> {
+    pub fn prims<S>(&self, tree: &Binary<S>, node: usize) -> Vec<u32> {
         let mut prims = Vec::with_capacity(self.counts[node] as usize);
         let mut stack = vec![node];
         while let Some(i) = stack.pop() {
-            match nodes[i].children() {
+            match tree.nodes[i].children() {
                 Some([l, r]) => stack.extend([r, l]),
-                None => prims.push(nodes[i].left),
+                None => prims.extend_from_slice(tree.prims(i)),
             }
         }
         prims.sort_unstable();

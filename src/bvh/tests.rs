@@ -49,6 +49,24 @@ fn every_preset_and_every_small_count() {
 }
 
 #[test]
+fn crowds_of_several_classes_become_leaves_of_one_each() {
+    // So small that a crowd costs least as one leaf, if it were of one class.
+    let crowds: Vec<_> = soup(250, 17)
+        .iter()
+        .flat_map(|place| {
+            soup(8, 18).into_iter().map(|b| [b.lo, b.hi].map(|p| [0, 1, 2].map(|i| place.lo[i] + 1e-3 * p[i])))
+        })
+        .map(|[lo, hi]| Aabb { lo, hi })
+        .collect();
+    let mixed: Vec<u8> = (0..crowds.len()).map(|i| (i % 3 % 2) as u8).collect();
+    for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
+        check(&crowds, &mixed, preset);
+        let tree = check(&crowds, &vec![0; crowds.len()], preset);
+        assert!((250..275).contains(&tree.quality().leaves), "{}", tree.quality().leaves);
+    }
+}
+
+#[test]
 fn leaves_are_as_small_as_asked_for() {
     // Nothing is gained by keeping such boxes apart.
     let boxes: Vec<_> = soup(3000, 21).iter().map(|b| Aabb { lo: b.lo, hi: b.lo.map(|x| x + 5.0) }).collect();
@@ -196,7 +214,9 @@ fn grown_to(boxes: &[Aabb<f32>], deepest: usize) -> Grown {
     assert_eq!((leaves[0].start, leaves.last().unwrap().end), (0, parts.len()));
     assert!(leaves.windows(2).all(|l| l[0].end == l[1].start));
     for leaf in &leaves {
-        assert!(leaf.len() == 1 || leaf.len() > BLOCK, "a leaf of {}", leaf.len());
+        let all: Vec<_> = parts[leaf.clone()].iter().map(|p| boxes[p.prim as usize]).collect();
+        let least = cost.is_one_leaf(join(&all).half_area() as f32, all.len() as u32);
+        assert!(leaf.len() == 1 || leaf.len() > BLOCK || least, "a leaf of {}", leaf.len());
     }
     (parts, nodes, leaves)
 }
@@ -210,10 +230,11 @@ fn union([a, b]: [[[f32; 3]; 2]; 2]) -> [[f32; 3]; 2] {
 }
 
 #[test]
-fn every_part_is_in_one_leaf_of_its_own() {
+fn every_part_is_in_one_leaf() {
     for n in (1..60).chain([500, 9000]) {
+        // Few boxes are met by many rays each; of many, some cost least together.
         let (_, _, leaves) = grown(&soup(n, n as u64));
-        assert_eq!(leaves.len(), n);
+        assert!(if n < 10 { leaves.len() == n } else { (n.div_ceil(BLOCK)..=n).contains(&leaves.len()) });
     }
 }
 
@@ -242,7 +263,7 @@ fn depth(boxes: &[Aabb<f32>], deepest: usize) -> usize {
 fn parts_with_one_centre_are_halved_or_left_together() {
     // Pairs of a square's two triangles have equal boxes.
     let pairs: Vec<_> = soup(300, 31).into_iter().flat_map(|b| [b, b]).collect();
-    assert_eq!(grown(&pairs).2.len(), pairs.len());
+    assert!((300..=600).contains(&grown(&pairs).2.len()));
     let unit = Aabb { lo: [0.0f32; 3], hi: [1.0; 3] };
     assert_eq!(grown(&[unit; 4]).2.len(), 4, "a block");
     assert_eq!(grown(&[unit; 5]).2.len(), 1, "more than a block");

@@ -75,7 +75,8 @@ pub struct Node {
     pub count: u32,
     /// Of an inner node: the right child; of a leaf: its first part.
     pub at: u32,
-    /// A leaf holds one part, or more than a block of such whose centres nothing tells apart.
+    /// A leaf holds one part, or a block at most that costs least as one leaf, or more than a block of such parts whose centres
+    /// nothing tells apart.
     pub leaf: bool,
 }
 
@@ -110,12 +111,12 @@ fn grow(parts: &mut [Part], nodes: &mut [Node], first: (usize, usize), rules: Ru
     nodes[0] = Node { bounds, count: n as u32, at: first.0 as u32, leaf: true };
     let [low, high] = centres.corners();
     let told_apart = (0..3).any(|a| high[a] - low[a] > rules.least);
-    if n == 1 || !told_apart && n > rules.block {
+    let is_one_leaf = n == 1 || n <= rules.block && rules.cost.is_one_leaf(bounds.area(), n as u32);
+    if is_one_leaf || !told_apart && n > rules.block {
         return;
     }
     let on_left = match n {
         _ if !told_apart || level > rules.deepest => halve(parts),
-        _ if n <= rules.block && rules.cost.is_one_leaf(bounds.area(), n as u32) => Some(n / 2),
         0..BINNED => split_sorted(parts, rules),
         _ => split_binned(parts, low, high, rules),
     };

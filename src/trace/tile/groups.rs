@@ -258,10 +258,12 @@ impl Groups {
         self.cap = least(near) * (1.0 - loose);
     }
 
-    /// How far a group's rays have gone from the common point, in their parameter, where that is `t`.
+    /// How far a group's rays have gone from the common point, in their parameter, where that is `t`. Never minus zero, which a
+    /// corner at the common point gives, and whose reciprocal would lie behind all.
     #[inline(always)]
     pub fn way(&self, g: usize, t: V) -> V {
-        if self.is_behind { t + self.behind[g] } else { t }
+        let from = if self.is_behind { self.behind[g] } else { V::constant(0.0) };
+        t + from
     }
 
     /// About how many rays, as dense as those of the tile, a box in world space would be met by; infinite if the common
