@@ -49,11 +49,10 @@ impl<S> Binary<S> {
         let Node { left, right, .. } = self.nodes[leaf];
         &self.prims[left as usize..][..!right as usize]
     }
+}
 
-    fn append(&mut self, slot: Slot, left: u32, right: u32) -> usize
-    where
-        S: Real,
-    {
+impl<S: Real> Binary<S> {
+    fn append(&mut self, slot: Slot, left: u32, right: u32) -> usize {
         let id = self.nodes.len();
         self.nodes.push(Node { bounds: Aabb::EMPTY, left, right });
         match slot {
@@ -64,10 +63,7 @@ impl<S> Binary<S> {
         id
     }
 
-    fn append_leaf(&mut self, slot: Slot, parts: &[Part])
-    where
-        S: Real,
-    {
+    fn append_leaf(&mut self, slot: Slot, parts: &[Part]) {
         self.append(slot, self.prims.len() as u32, !(parts.len() as u32));
         self.prims.extend(parts.iter().map(|part| part.prim));
     }
