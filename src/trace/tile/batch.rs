@@ -23,7 +23,7 @@
 use super::edges::{Doubt, cross, cross_accurate, doubt, longest, minus, own_edges, sum};
 use super::groups::{Groups, splats};
 use super::place::Place;
-use super::{HALF_ULP, V, select};
+use super::{HALF_ULP, SETS, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, f32x8, map3};
 use crate::shape::Block;
 
@@ -37,7 +37,7 @@ const LEAST_VOLUME: f32 = 1e-30;
 /// distance.
 const MOST_SHIFT: f32 = 10.0 * HALF_ULP;
 
-/// Edge functions must add up to this many times their error, so that there is something to divide by.
+/// What weights (which add up to one) must be of their error.
 const LEAST_SUM: f32 = 8.0;
 
 /// A distance between the apex and a plane is certain beyond this part of the products it is made of.
@@ -79,9 +79,9 @@ impl Default for Batch {
 pub struct Planes {
     /// The three edge functions and 1/z: x, y, z of each.
     pub linear: [[[f32; BATCH]; 3]; 4],
-    /// Where an edge function is this much negative, the triangle is missed.
+    /// Where an edge function is below this, the triangle is missed.
     pub outside: [f32; BATCH],
-    /// Where all are this much positive, it is met.
+    /// Where all are at least this, it is met.
     pub inside: [f32; BATCH],
     /// Factors that widen 1/z to what the common formula may find: at most, at least.
     pub most: [f32; BATCH],
@@ -91,10 +91,6 @@ pub struct Planes {
     pub nearest: [f32; BATCH],
     /// See `nearest`.
     pub farthest: [f32; BATCH],
-    /// Own answers: what was added to the edge functions.
-    pub eps: [[f32; BATCH]; 3],
-    /// Own answers: from here on an edge function (with what was added to it) is surely positive.
-    pub sure: [f32; BATCH],
     /// Rays without a common start: the first corner and the normal that points away from the apex, in the axes of the
     /// geometry and the scale of the frame.
     pub side: [[f32; BATCH]; 6],
@@ -104,14 +100,14 @@ pub struct Planes {
     pub rcp: [f32; BATCH],
     /// Own answers: triangles too small for this arithmetic or seen edge-on, bit by triangle.
     pub wild: u32,
-    /// Own answers: triangles whose edges need more digits, bit by triangle.
+    /// Own answers: triangles whose weights need more digits, bit by triangle.
     pub unsteady: u32,
     /// Own answers, rays with a common point behind them: triangles whose `rcp` is not certain, bit by triangle.
     pub flat: u32,
     /// Own answers: the corners in the frame.
     pub corners: [[[f32; BATCH]; 3]; 3],
-    /// Signs of x and y of each linear function, bit by triangle.
-    pub negative: [[u32; 2]; 4],
+    /// Where the largest value of each linear function over a group lies, s and t: index of [`Groups::rect`] without the set.
+    pub corner: [[[u32; BATCH]; 2]; 4],
 }
 
 impl Batch {
@@ -266,13 +262,14 @@ impl Batch {
         let volume = dot(normal, p[0]);
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
         let rcp = one / volume;
-        let back = volume.cmp_lt(zero);
-        let faced = |x: V| select(back, -x, x);
         if ANY || groups.is_behind {
             self.set_up_side(groups, planes);
         }
+        // Over the volume an edge function is positive on the side that faces the apex, and the corner's weight times 1/z.
         let (edges, eps) = own_edges(groups, p);
-        let edges = map3(edges, |e| map3(e, faced));
+        let edges = map3(edges, |e| map3(e, |x| x * rcp));
+        let size = volume.abs();
+        let eps = map3(eps, |e| e * rcp.abs());
         // A corner beside or behind the apex sets no bound to what is nearest.
         let low = p[0][2].fast_min(p[1][2]).fast_min(p[2][2]);
         let high = p[0][2].fast_max(p[1][2]).fast_max(p[2][2]);
@@ -282,18 +279,17 @@ impl Batch {
         farthest.store(&mut planes.farthest);
 
         let most = sum(p[0]).fast_max(sum(p[1])).fast_max(sum(p[2])) * V::splat(MOST_SHIFT);
-        let size = volume.abs();
         let mut steady = zero.cmp_lt(high);
         for k in 0..3 {
             // The edge's length as it is seen: its function's slope is that times the depth. An edge that is seen end-on
             // moves far.
             let seen = edges[k][0].abs().fast_max(edges[k][1].abs());
             let near = (eps[k] * high).cmp_le(seen * most) | eps[k].cmp_lt(groups.smallest(&edges[k]));
-            steady = steady & near & (eps[k] * high * V::splat(LEAST_SUM)).cmp_le(size);
+            steady = steady & near & (eps[k] * high).cmp_le(V::splat(1.0 / LEAST_SUM));
         }
-        // What was added to the edge functions is in them twice where they are surely positive.
-        let sure = eps[0].fast_max(eps[1]).fast_max(eps[2]);
-        (sure + sure).store(&mut planes.sure);
+        let eps = eps[0].fast_max(eps[1]).fast_max(eps[2]);
+        (-eps).store(&mut planes.outside);
+        eps.store(&mut planes.inside);
         planes.corners = map3(*p, |q| map3(q, V::to_array));
         let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
         planes.wild = in_front & !V::splat(LEAST_VOLUME).cmp_le(size).bits();
@@ -301,11 +297,9 @@ impl Batch {
         if groups.is_behind {
             planes.unsteady |= planes.flat;
         }
-        // With its rounding error added, an edge function is positive wherever the exact one is.
-        let [e0, e1, e2] = each(|k| [edges[k][0], edges[k][1], edges[k][2] + eps[k]]);
-        planes.eps.iter_mut().zip(eps).for_each(|(to, x)| x.store(to));
         let own = |inverse: V| nearest.fast_min(farthest.fast_max(inverse));
-        planes.store(groups, &[e0, e1, e2, map3(normal, |n| n * rcp)], zero, own) & in_front | planes.wild
+        let [e0, e1, e2] = edges;
+        planes.store(groups, &[e0, e1, e2, map3(normal, |n| n * rcp)], eps, own) & in_front | planes.wild
     }
 }
 
@@ -326,7 +320,8 @@ impl Planes {
         let mut seen = V::splat(f32::INFINITY);
         for (k, f) in linear.iter().enumerate() {
             let negative = [f[0].cmp_lt(zero), f[1].cmp_lt(zero)];
-            self.negative[k] = [negative[0].bits(), negative[1].bits()];
+            let [low, high] = [0, SETS as u32].map(|i| V::splat(f32::from_bits(i)));
+            self.corner[k] = negative.map(|is_low| bytemuck::cast(select(is_low, low, high).to_array()));
             let (s, t) = (select(negative[0], s0, s1), select(negative[1], t0, t1));
             let value = f[0].mul_add(s, f[1].mul_add(t, f[2]));
             let margin = if k < 3 { value + eps } else { bound(value) - V::splat(groups.nearest) };

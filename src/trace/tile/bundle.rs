@@ -92,6 +92,9 @@ impl<'a> Bundle<'a> {
     #[inline(always)]
     pub fn find<const N: usize>(rays: &'a Rays<f32>, first: usize, any: bool) -> Option<Self> {
         let mut bundle = Self::unsorted(rays, first, groups::<N>(rays, first));
+        if bundle.starts_plainly(rays) {
+            return Some(bundle);
+        }
         // Most rays without a common point show it within the first group.
         let len = std::mem::replace(&mut bundle.len, 1);
         bundle.sort_lanes(rays, 0);
@@ -101,6 +104,31 @@ impl<'a> Bundle<'a> {
         bundle.len = len;
         bundle.sort_lanes(rays, 1);
         bundle.share(rays, any).then_some(bundle)
+    }
+
+    /// Whether all rays are tame and start in one point, told in one look at them; what it says no to may be so all the same.
+    #[inline(always)]
+    fn starts_plainly(&mut self, rays: &Rays<f32>) -> bool {
+        self.apex = rays.org(self.first);
+        if !self.apex.iter().all(|x| x.abs() <= TAME.1) {
+            return false;
+        }
+        let apex = map3(self.apex, V::splat);
+        let (least, most) = (V::splat(3.0 * TAME.0), V::splat(TAME.1));
+        for g in 0..self.len {
+            prefetch_rays(rays, self.first + (g + AHEAD) * V::N);
+            let at = self.first + g * V::N;
+            let (org, dir) = (load3(&rays.org, at), load3(&rays.dir, at));
+            let (t_min, t_max) = (V::load(&rays.t_min[at..]), V::load(&rays.t_max[at..]));
+            let size = dir[0].abs() + dir[1].abs() + dir[2].abs();
+            let plain = org[0].cmp_eq(apex[0]) & org[1].cmp_eq(apex[1]) & org[2].cmp_eq(apex[2]);
+            let plain = plain & least.cmp_le(size) & size.cmp_le(most);
+            if (plain & V::constant(0.0).cmp_le(t_min) & t_min.cmp_le(t_max)).bits() != V::ALL {
+                return false;
+            }
+        }
+        self.tame[..self.len].fill(V::ALL);
+        true
     }
 
     /// Groups of rays, nothing known of them.

@@ -10,9 +10,9 @@ const MOVED: f32 = 16.0;
 /// Relative rounding error of sums of products in the common formula.
 const PRODUCTS: f32 = 8.0 * HALF_ULP;
 
-/// The same in the tile's own, counted over all operations: of slopes times the tile's width, and of the value at the
-/// ray they are made around.
-const OWN_PRODUCTS: [f32; 2] = [14.0 * HALF_ULP, 10.0 * HALF_ULP];
+/// The same in the tile's own, counted over all operations (the division by the volume is one): of slopes times the
+/// tile's width, and of the value at the ray they are made around.
+const OWN_PRODUCTS: [f32; 2] = [18.0 * HALF_ULP, 12.0 * HALF_ULP];
 
 /// How far numbers may be from those of the common formula.
 pub struct Doubt {

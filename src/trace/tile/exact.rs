@@ -109,7 +109,6 @@ pub fn certain_pair<const ANY: bool, const BEHIND: bool>(
     let certain = possible & V::splat(planes.inside[i]).cmp_le(edge) & inv_hi.cmp_lt(lo) & ahead;
     if ANY {
         groups.of[g].inv_lo = select(certain, V::splat(f32::INFINITY), inv_lo);
-        groups.of[g].done |= certain.bits();
     } else {
         groups.of[g].inv_lo = select(certain, lo, inv_lo);
         groups.of[g].inv_hi = select(certain, hi, inv_hi);
@@ -142,7 +141,6 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slo
         hits |= hit;
     });
     if ANY {
-        groups.of[g].done |= hits;
         let done = Mask::from_bits(hits);
         groups.of[g].inv_lo = select(done, V::splat(f32::INFINITY), groups.of[g].inv_lo);
         return;
@@ -164,7 +162,7 @@ pub fn decide<const ANY: bool>(groups: &mut Groups, exact: &Exact, g: usize, slo
         });
     }
     // From here on the depth is known as well as the common formula knows it.
-    let inverse = V::constant(1.0) / (groups.way(g, t) * groups.of[g].speed);
+    let inverse = groups.of[g].slowness / groups.way(g, t);
     let loose = groups.loose;
     let mask = Mask::from_bits(wins);
     groups.of[g].inv_lo = select(mask, bounded(inverse) * V::splat(1.0 - loose), groups.of[g].inv_lo);

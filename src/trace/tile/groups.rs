@@ -32,16 +32,17 @@ pub struct Group {
     pub inv_hi: V,
     /// Triangle of the best hit, as [`super::batch::Batch::id`] has it, or [`NO_SLOT`].
     pub slot: [u32; 16],
-    /// Own answers: edge functions of the best hit, those of the second and third corner and the sum of all.
-    pub weights: [V; 3],
+    /// Own answers: weights of the second and third corner at the best hit, times 1/z there.
+    pub weights: [V; 2],
     /// Rays without a common start: where their segments start, in the axes of the geometry and
     /// the scale of the frame.
     pub start: Lanes3<V>,
-    /// Depth per unit of the ray's parameter.
-    pub speed: V,
-    /// Lanes that found something (any-hit).
-    pub done: u32,
+    /// The ray's parameter per unit of depth.
+    pub slowness: V,
 }
+
+// An odd number of cache lines: the same numbers of all groups lie in different sets of the cache.
+const _: () = assert!(size_of::<Group>() / 64 % 2 == 1);
 
 impl Default for Group {
     fn default() -> Self {
@@ -52,10 +53,9 @@ impl Default for Group {
             inv_lo: zero,
             inv_hi: zero,
             slot: [NO_SLOT; 16],
-            weights: [zero; 3],
+            weights: [zero; 2],
             start: [zero; 3],
-            speed: zero,
-            done: 0,
+            slowness: zero,
         }
     }
 }
@@ -138,8 +138,8 @@ impl Default for Groups {
 struct Lines {
     s: V,
     t: V,
-    /// Depth per unit of t (common start) or at t = 0 (common end).
-    speed: V,
+    /// Parameter per unit of depth (common start), or the reciprocal depth at t = 0 (common end).
+    slowness: V,
     /// 1/z at the far end of the segment.
     far: V,
     /// 1/z at its near end.
@@ -178,7 +178,6 @@ impl Groups {
             for i in 0..SET {
                 let g = q * SET + i;
                 self.of[g].slot = [NO_SLOT; 16];
-                self.of[g].done = 0;
                 if groups >> g & 1 == 0 || bundle.tame[g] == 0 {
                     (self.of[g].inv_lo, self.of[g].inv_hi) = (most, most);
                     continue;
@@ -189,7 +188,7 @@ impl Groups {
                     return false;
                 }
                 let lanes = Mask::from_bits(tame);
-                (self.of[g].s, self.of[g].t, self.of[g].speed) = (lines.s, lines.t, lines.speed);
+                (self.of[g].s, self.of[g].t, self.of[g].slowness) = (lines.s, lines.t, lines.slowness);
                 if bundle.shared != Shared::Start {
                     self.of[g].start = map3(bundle.starts(g), |x| x * V::splat(self.frame.scale));
                 }
@@ -201,7 +200,7 @@ impl Groups {
                 reach = select(lanes, lines.reach, reach).fast_max(reach);
                 if bundle.shared == Shared::Behind {
                     self.behind[g] = lines.behind;
-                    front = select(lanes, lines.behind * lines.speed, front).fast_min(front);
+                    front = select(lanes, lines.behind / lines.slowness, front).fast_min(front);
                 }
                 self.of[g].inv_lo = select(lanes, bounded(lines.far), most);
                 self.of[g].inv_hi = select(lanes, if EXACT { lines.far } else { lines.near }, most);
@@ -258,6 +257,12 @@ impl Groups {
         self.cap = least(near) * (1.0 - loose);
     }
 
+    /// Which of a group's `lanes` found something (any-hit): those that want nothing any more.
+    #[inline(always)]
+    pub fn done(&self, g: usize, lanes: u32) -> u32 {
+        V::splat(f32::INFINITY).cmp_le(self.of[g].inv_lo).bits() & lanes
+    }
+
     /// How far a group's rays have gone from the common point, in their parameter, where that is `t`. Never minus zero, which a
     /// corner at the common point gives, and whose reciprocal would lie behind all.
     #[inline(always)]
@@ -288,9 +293,9 @@ impl Groups {
         if let Source::Pencil(pencil, middle) = bundle.source {
             let [s, t] = pencil.places.around(bundle.first / V::N + g, middle);
             let (s, t) = (V::new(s), V::new(t));
-            let (speed, near) = (V::splat(self.frame.scale), V::splat(f32::INFINITY));
+            let (slowness, near) = (V::splat(1.0 / self.frame.scale), V::splat(f32::INFINITY));
             let fit = s.abs().cmp_lt(V::splat(WIDEST)) & t.abs().cmp_lt(V::splat(WIDEST));
-            return Lines { s, t, speed, far: zero, near, fit: fit.bits(), reach: zero, behind: zero };
+            return Lines { s, t, slowness, far: zero, near, fit: fit.bits(), reach: zero, behind: zero };
         }
         let [t_min, t_max] = bundle.ends(g);
         let direction = bundle.ways(g);
@@ -323,7 +328,7 @@ impl Groups {
                 (slowness / start, slowness / zero.fast_max(end), size)
             }
         };
-        Lines { s, t, speed, far, near, fit: fit.bits(), reach, behind }
+        Lines { s, t, slowness, far, near, fit: fit.bits(), reach, behind }
     }
 
     /// The smallest values of some linear functions over the tile's rectangle.

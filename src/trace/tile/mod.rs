@@ -304,7 +304,7 @@ impl<'a> Job<'a> {
             self.counters.rays += u64::from((exact.bundle.tame[g] | odd).count_ones());
         }
         if ANY {
-            let mut done = self.memory.groups.of[g].done;
+            let mut done = self.memory.groups.done(g, exact.bundle.tame[g]);
             if odd != 0 {
                 done |= self.rest::<ANY, COUNT>(first, odd, None).1;
             }

@@ -12,7 +12,7 @@ use super::{Mask, V, select};
 use crate::lanes::chosen::merge;
 use crate::lanes::past::store_past;
 use crate::lanes::words::{below, positions};
-use crate::lanes::{LaneMask, Lanes, dot, each};
+use crate::lanes::{LaneMask, Lanes, dot, each, f64x8, map3};
 use crate::ray::{HitPacket, Hits, INVALID_ID};
 use crate::shape::{Block, Triangle};
 
@@ -27,8 +27,16 @@ pub fn own_depth(planes: &Planes, i: usize, inverse: V) -> V {
 pub struct Verdict {
     /// Some ray hit the triangle.
     pub hit: bool,
-    /// Some ray passes an edge within its rounding: for [`pair_doubtful`].
+    /// Some ray passes an edge within its rounding, or its best hit is as near: for [`pair_doubtful`].
     pub doubt: bool,
+}
+
+impl Verdict {
+    /// `hit` of `possible` rays are certain.
+    #[inline(always)]
+    fn of(hit: Mask, possible: Mask) -> Self {
+        Self { hit: hit.any(), doubt: (possible & !hit).any() }
+    }
 }
 
 /// The numbers of a triangle: ties of depth go to the smaller instance, then to the smaller primitive.
@@ -41,15 +49,16 @@ pub struct Id {
 }
 
 impl Id {
-    /// Lanes of a group that hit nothing yet or something with larger numbers. `MANY`: there are instances.
+    /// Lanes of a group that hit nothing yet, or this triangle or one with larger numbers. `MANY`: there are instances.
     #[inline(always)]
-    pub fn comes_first<const MANY: bool>(self, groups: &Groups, g: usize) -> Mask {
-        let smaller = below(self.prim, &groups.of[g].slot);
+    pub fn is_not_after<const MANY: bool>(self, groups: &Groups, g: usize) -> Mask {
+        let slots = &groups.of[g].slot;
+        let prim = below(self.prim, slots) | positions(slots, self.prim);
         if !MANY {
-            return Mask::from_bits(smaller);
+            return Mask::from_bits(prim);
         }
         let inst = &groups.inst[g];
-        Mask::from_bits(below(self.inst, inst) | positions(inst, self.inst) & smaller)
+        Mask::from_bits(below(self.inst, inst) | positions(inst, self.inst) & prim)
     }
 
     /// Names the triangle as what some lanes hit.
@@ -71,30 +80,31 @@ pub fn pair<const ANY: bool, const MANY: bool>(
     i: usize,
     id: Id,
 ) -> Verdict {
-    let (inside, maybe, edges) = inside(groups, planes, g, i);
+    let Edges { possible, certain, weights } = edges(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
     let best = groups.of[g].inv_lo;
-    let reached = inverse.cmp_le(groups.of[g].inv_hi) & best.cmp_le(inverse);
-    let doubt = (maybe & reached).any();
-    if ANY {
-        return Verdict { hit: occlude(groups, g, inside & reached), doubt };
+    let mut possible = possible & best.cmp_le(inverse);
+    if groups.ends_early {
+        possible = possible & inverse.cmp_le(groups.of[g].inv_hi);
     }
-    let nearer = best.cmp_lt(inverse) | id.comes_first::<MANY>(groups, g);
-    let hit = inside & reached & nearer;
+    if ANY {
+        let hit = possible & certain;
+        occlude(groups, g, hit);
+        return Verdict::of(hit, possible);
+    }
+    let hit = possible & certain & best.cmp_lt(inverse);
     id.name::<MANY>(groups, g, hit);
-    keep(groups, planes, g, i, hit, inverse, edges);
-    Verdict { hit: hit.any(), doubt }
+    keep(groups, g, hit, inverse, weights);
+    Verdict::of(hit, possible)
 }
 
-/// Keeps the depth and the weights of a hit; `edges` are the edge functions.
+/// Keeps the depth and the weights of a hit.
 #[inline(always)]
-fn keep(groups: &mut Groups, planes: &Planes, g: usize, i: usize, hit: Mask, inverse: V, edges: [V; 3]) {
-    let [e0, e1, e2] = each(|k| edges[k] - V::splat(planes.eps[k][i]));
+fn keep(groups: &mut Groups, g: usize, hit: Mask, inverse: V, found: [V; 2]) {
     let Group { inv_lo, weights, .. } = &mut groups.of[g];
     *inv_lo = select(hit, inverse, *inv_lo);
-    weights[0] = select(hit, e1, weights[0]);
-    weights[1] = select(hit, e2, weights[1]);
-    weights[2] = select(hit, e0 + e1 + e2, weights[2]);
+    weights[0] = select(hit, found[0], weights[0]);
+    weights[1] = select(hit, found[1], weights[1]);
 }
 
 /// One triangle against the rays of one group that share their end (any-hit).
@@ -103,31 +113,32 @@ fn keep(groups: &mut Groups, planes: &Planes, g: usize, i: usize, hit: Mask, inv
 /// its own surface a ray starts on; where the start lies with respect to the triangle's plane can.
 #[inline(always)]
 pub fn pair_to_end(groups: &mut Groups, planes: &Planes, g: usize, i: usize) -> Verdict {
-    let (inside, maybe, _) = inside(groups, planes, g, i);
+    let Edges { possible, certain, .. } = edges(groups, planes, g, i);
     let behind = behind(groups, planes, g, i);
-    let mut reached = V::constant(0.0).cmp_le(behind) & groups.of[g].inv_lo.cmp_lt(V::splat(f32::INFINITY));
+    let waiting = groups.of[g].inv_lo.cmp_lt(V::splat(f32::INFINITY));
+    let mut possible = possible & V::constant(0.0).cmp_le(behind) & waiting;
     if groups.ends_early {
-        reached = reached & own_depth(planes, i, linear(groups, planes, g, i, 3)).cmp_le(groups.of[g].inv_hi);
+        possible = possible & own_depth(planes, i, linear(groups, planes, g, i, 3)).cmp_le(groups.of[g].inv_hi);
     }
-    let doubt = (maybe & reached).any();
-    Verdict { hit: occlude(groups, g, inside & reached), doubt }
+    let hit = possible & certain;
+    occlude(groups, g, hit);
+    Verdict::of(hit, possible)
 }
 
 /// One triangle against the rays of one group that share a point behind them. As with a common end, which side of a triangle
 /// they start on is told by the start; and so is how far ahead of it they hit.
 #[inline(always)]
 pub fn pair_ahead(groups: &mut Groups, planes: &Planes, g: usize, i: usize, id: Id) -> Verdict {
-    let (inside, maybe, edges) = inside(groups, planes, g, i);
+    let Edges { possible, certain, weights } = edges(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
     let best = groups.of[g].inv_lo;
     let ahead = -behind(groups, planes, g, i);
-    let reached = V::constant(0.0).cmp_le(ahead) & best.cmp_le(inverse);
-    let nearer = best.cmp_lt(inverse) | id.comes_first::<false>(groups, g);
-    let hit = inside & reached & nearer;
+    let possible = possible & V::constant(0.0).cmp_le(ahead) & best.cmp_le(inverse);
+    let hit = possible & certain & best.cmp_lt(inverse);
     groups.ahead[g] = select(hit, ahead * V::splat(planes.rcp[i]), groups.ahead[g]);
     id.name::<false>(groups, g, hit);
-    keep(groups, planes, g, i, hit, inverse, edges);
-    Verdict { hit: hit.any(), doubt: (maybe & reached).any() }
+    keep(groups, g, hit, inverse, weights);
+    Verdict::of(hit, possible)
 }
 
 /// How far the segments of a group start behind a triangle's plane as seen from their common point; in some unit.
@@ -137,9 +148,9 @@ fn behind(groups: &Groups, planes: &Planes, g: usize, i: usize) -> V {
     dot(normal, way)
 }
 
-/// [`pair`] where edges need more digits than f32 has: for a sliver, a triangle much smaller than a pixel, or rays that
-/// pass an edge within its rounding. What is not certainly outside is looked at again in f64, for the same corners and
-/// rays.
+/// [`pair`] where edges need more digits than f32 has: for rays that pass an edge within its rounding, and for the weights of
+/// slivers and of triangles much smaller than a pixel. What is not certainly outside is looked at again in f64, for the same
+/// corners and rays; so is what was found.
 #[cold]
 #[inline(never)]
 pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
@@ -150,10 +161,9 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     id: Id,
     to_end: bool,
 ) -> bool {
-    let (inside, doubtful, _) = inside(groups, planes, g, i);
     let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
     let best = groups.of[g].inv_lo;
-    let mut maybe = (inside | doubtful) & inverse.cmp_le(groups.of[g].inv_hi);
+    let mut maybe = edges(groups, planes, g, i).possible & inverse.cmp_le(groups.of[g].inv_hi);
     if ANY && to_end {
         maybe = maybe & V::constant(0.0).cmp_le(behind(groups, planes, g, i)) & best.cmp_lt(V::splat(f32::INFINITY));
     } else {
@@ -161,51 +171,61 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     }
     let mut ahead = V::constant(0.0);
     if !ANY {
-        maybe = maybe & (best.cmp_lt(inverse) | id.comes_first::<MANY>(groups, g));
+        maybe = maybe & (best.cmp_lt(inverse) | id.is_not_after::<MANY>(groups, g));
         if groups.is_behind {
             ahead = -behind(groups, planes, g, i);
             maybe = maybe & V::constant(0.0).cmp_le(ahead);
         }
     }
-    let (mut rest, mut hit) = (maybe.bits(), 0);
-    let mut weights = groups.of[g].weights.map(V::to_array);
-    while rest != 0 {
-        let lane = rest.trailing_zeros() as usize & 15;
-        rest &= rest - 1;
-        let ray = [groups.of[g].s.to_array()[lane], groups.of[g].t.to_array()[lane], 1.0].map(f64::from);
-        let corners = planes.corners.map(|p| p.map(|x| f64::from(x[i])));
-        if let Some(found) = weights_f64(corners, ray) {
-            hit |= 1 << lane;
-            (0..3).for_each(|k| weights[k][lane] = found[k] as f32);
-        }
-    }
-    let hit = Mask::from_bits(hit);
+    let (hit, weights) = exact_weights(groups, planes, g, i, maybe.bits());
     if ANY {
         return occlude(groups, g, hit);
     }
-    groups.of[g].inv_lo = select(hit, inverse, best);
     if groups.is_behind {
         groups.ahead[g] = select(hit, ahead * V::splat(planes.rcp[i]), groups.ahead[g]);
     }
     id.name::<MANY>(groups, g, hit);
-    groups.of[g].weights = weights.map(V::new);
+    keep(groups, g, hit, inverse, weights.map(|w| w * inverse));
     hit.any()
 }
 
-/// Weights of the second and third corner and one, if the ray through the apex meets the triangle.
-fn weights_f64(corners: [[f64; 3]; 3], ray: [f64; 3]) -> Option<[f64; 3]> {
-    let [a, b, c] = corners.map(|p| [p[0] - ray[0] * p[2], p[1] - ray[1] * p[2]]);
-    let cross = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
+/// Which of the `wanted` lanes of a group meet triangle `i`, and the weights of its second and third corner there, in f64.
+#[inline(always)]
+fn exact_weights(groups: &Groups, planes: &Planes, g: usize, i: usize, wanted: u32) -> (Mask, [V; 2]) {
+    let corners = planes.corners.map(|p| p.map(|x| f64::from(x[i])));
+    let [s, t] = [groups.of[g].s, groups.of[g].t].map(V::to_array);
+    let (mut hit, mut weights) = (0, [[0.0; 16]; 2]);
+    for half in (0..2).filter(|half| wanted >> (8 * half) & 0xff != 0) {
+        let ray = [s, t].map(|x| f64x8::new(std::array::from_fn(|k| f64::from(x[8 * half + k]))));
+        let (inside, found) = weights_f64(&corners, ray);
+        hit |= inside << (8 * half);
+        for (weight, x) in weights.iter_mut().zip(found) {
+            let x = x.to_array();
+            (0..8).for_each(|k| weight[8 * half + k] = x[k] as f32);
+        }
+    }
+    (Mask::from_bits(hit & wanted), weights.map(V::new))
+}
+
+/// Which of eight rays through the apex meet the triangle, and the weights of the second and third corner.
+#[inline(always)]
+fn weights_f64(corners: &[[f64; 3]; 3], ray: [f64x8; 2]) -> (u32, [f64x8; 2]) {
+    let (zero, one) = (f64x8::splat(0.0), f64x8::splat(1.0));
+    let [a, b, c] = map3(*corners, |p| [0, 1].map(|k| f64x8::splat(p[k]) - ray[k] * f64x8::splat(p[2])));
+    let cross = |p: [f64x8; 2], q: [f64x8; 2]| p[0] * q[1] - p[1] * q[0];
     // Seen along the ray; nothing may pass between neighbours, so a rounding error counts as inside.
-    let spread = [a, b, c].into_iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let [a_size, b_size, c_size] = map3([a, b, c], |p| Lanes::abs(p[0]).fast_max(Lanes::abs(p[1])));
+    let spread = a_size.fast_max(b_size).fast_max(c_size);
     let edges = [cross(b, c), cross(c, a), cross(a, b)];
     let sum = edges[0] + edges[1] + edges[2];
-    let eps = 16.0 * f64::EPSILON * spread * spread;
+    let eps = f64x8::splat(16.0 * f64::EPSILON) * spread * spread;
     // The side of the triangle that faces the apex.
     let [p, q, r] = corners.map(DVec3::from_array);
-    let facing = p.dot(q.cross(r)).signum();
-    let inside = edges.iter().all(|e| e * facing >= -eps);
-    (inside && sum != 0.0).then(|| [(edges[1] / sum).clamp(0.0, 1.0), (edges[2] / sum).clamp(0.0, 1.0), 1.0])
+    let facing = f64x8::splat(p.dot(q.cross(r)).signum());
+    let [e0, e1, e2] = map3(edges, |e| e * facing);
+    let inside = (-eps).cmp_le(e0.fast_min(e1).fast_min(e2)).bits() & !sum.cmp_eq(zero).bits();
+    let weight = |e: f64x8| zero.fast_max(one.fast_min(e / sum));
+    (inside, [weight(edges[1]), weight(edges[2])])
 }
 
 /// A linear function of triangle `i` at the rays of a group.
@@ -215,28 +235,34 @@ fn linear(groups: &Groups, planes: &Planes, g: usize, i: usize, k: usize) -> V {
     x.mul_add(groups.of[g].s, y.mul_add(groups.of[g].t, z))
 }
 
-/// Lanes surely inside the triangle, lanes that rounding may have put on the wrong side of an edge, and the edge
-/// functions.
+/// A triangle's edges against the rays of a group.
+struct Edges {
+    /// Lanes not surely outside.
+    possible: Mask,
+    /// Lanes surely inside.
+    certain: Mask,
+    /// Weights of the second and third corner, times 1/z.
+    weights: [V; 2],
+}
+
 #[inline(always)]
-fn inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> (Mask, Mask, [V; 3]) {
-    let edges = each(|k| linear(groups, planes, g, i, k));
-    let least = edges[0].fast_min(edges[1]).fast_min(edges[2]);
-    let sure = V::splat(planes.sure[i]);
-    (sure.cmp_le(least), V::constant(0.0).cmp_le(least) & least.cmp_lt(sure), edges)
+fn edges(groups: &Groups, planes: &Planes, g: usize, i: usize) -> Edges {
+    let [e0, e1, e2] = each(|k| linear(groups, planes, g, i, k));
+    let least = e0.fast_min(e1).fast_min(e2);
+    let [possible, certain] = [planes.outside[i], planes.inside[i]].map(|x| V::splat(x).cmp_le(least));
+    Edges { possible, certain, weights: [e1, e2] }
 }
 
 /// Whether some ray of a group is not certainly outside triangle `i`.
 #[inline(always)]
 pub fn may_be_inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> bool {
-    let (inside, doubtful, _) = inside(groups, planes, g, i);
-    (inside | doubtful).any()
+    edges(groups, planes, g, i).possible.any()
 }
 
 /// Lanes that found something want nothing any more.
 #[inline(always)]
 pub fn occlude(groups: &mut Groups, g: usize, hit: Mask) -> bool {
     groups.of[g].inv_lo = select(hit, V::splat(f32::INFINITY), groups.of[g].inv_lo);
-    groups.of[g].done |= hit.bits();
     hit.any()
 }
 
@@ -263,7 +289,6 @@ pub fn decide<const ANY: bool, const MANY: bool>(
         let (packet, t_max) = exact.bundle.packet(g);
         (packet, t_max, exact.bundle.tame[g])
     };
-    let one = V::constant(1.0);
     let mut any = false;
     Triangle::intersect(&packet, t_max, &block, 1, tame, |found, lanes, _| {
         let hit = found.hit & found.t.cmp_le(t_max) & Mask::from_bits(lanes);
@@ -272,17 +297,17 @@ pub fn decide<const ANY: bool, const MANY: bool>(
             return;
         }
         let way = groups.way(g, found.t);
-        let inverse = (one / (way * groups.of[g].speed)).fast_min(V::splat(f32::MAX));
+        let inverse = (groups.of[g].slowness / way).fast_min(V::splat(f32::MAX));
         let best = groups.of[g].inv_lo;
-        let tie = best.cmp_eq(inverse) & id.comes_first::<MANY>(groups, g);
+        let tie = best.cmp_eq(inverse) & id.is_not_after::<MANY>(groups, g);
         let wins = hit & (best.cmp_lt(inverse) | tie);
         groups.of[g].inv_lo = select(wins, inverse, best);
         if groups.is_behind {
             groups.ahead[g] = select(wins, found.t / way, groups.ahead[g]);
         }
         id.name::<MANY>(groups, g, wins);
-        for (weight, x) in groups.of[g].weights.iter_mut().zip([found.u, found.v, one]) {
-            *weight = select(wins, x, *weight);
+        for (weight, x) in groups.of[g].weights.iter_mut().zip([found.u, found.v]) {
+            *weight = select(wins, x * inverse, *weight);
         }
         any |= wins.any();
     });
@@ -294,14 +319,14 @@ impl Groups {
     #[inline(always)]
     fn own_numbers(&self, g: usize, bundle: &Bundle) -> (Mask, V, V, V) {
         let found = Mask::from_bits(!positions(&self.of[g].slot, NO_SLOT));
-        let one = V::constant(1.0);
+        let depth = V::constant(1.0) / self.of[g].inv_lo;
         let [t_min, t_max] = bundle.ends(g);
-        let part = if self.is_behind { self.ahead[g] } else { one };
-        let t = t_min.fast_max(t_max.fast_min(part / (self.of[g].inv_lo * self.of[g].speed)));
-        let [u, v, sum] = self.of[g].weights;
-        let scale = one / sum;
-        let or_zero = |x: V| select(found, x * scale, V::constant(0.0));
-        (found, t, or_zero(u), or_zero(v))
+        let mut t = depth * self.of[g].slowness;
+        if self.is_behind {
+            t = t * self.ahead[g];
+        }
+        let [u, v] = self.of[g].weights.map(|w| select(found, w * depth, V::constant(0.0)));
+        (found, t_min.fast_max(t_max.fast_min(t)), u, v)
     }
 
     /// Writes a group's own hits and misses. `past`: past the caches.

@@ -44,7 +44,7 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
         let g = rest.trailing_zeros() as usize & (GROUPS - 1);
         rest &= rest - 1;
         let (packet, t_max, lanes) = enter(exact, inst, g);
-        let lanes = lanes & !groups.of[g].done;
+        let lanes = lanes & !groups.done(g, lanes);
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), stack, counters);
         leaf::block(object, inst, &packet, &mut query, leaf, lanes);
         let (hit, done) = (query.hit, query.done);
@@ -61,8 +61,7 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
 
 /// Keeps the hits of a packet where they are a group's nearest; whether any is.
 fn take(groups: &mut Groups, g: usize, hit: &HitPacket<V>, inst: u32) -> bool {
-    let one = V::constant(1.0);
-    let inverse = (one / (hit.t * groups.of[g].speed)).fast_min(V::splat(f32::MAX));
+    let inverse = (groups.of[g].slowness / hit.t).fast_min(V::splat(f32::MAX));
     let mut rest = !positions(&hit.prim, INVALID_ID) & V::ALL;
     let mut any = false;
     while rest != 0 {
@@ -70,12 +69,12 @@ fn take(groups: &mut Groups, g: usize, hit: &HitPacket<V>, inst: u32) -> bool {
         let same = positions(&hit.prim, id.prim) & rest;
         rest &= !same;
         let best = groups.of[g].inv_lo;
-        let tie = best.cmp_eq(inverse) & id.comes_first::<true>(groups, g);
+        let tie = best.cmp_eq(inverse) & id.is_not_after::<true>(groups, g);
         let wins = Mask::from_bits(same) & (best.cmp_lt(inverse) | tie);
         groups.of[g].inv_lo = select(wins, inverse, best);
         id.name::<true>(groups, g, wins);
-        for (weight, x) in groups.of[g].weights.iter_mut().zip([hit.u, hit.v, one]) {
-            *weight = select(wins, x, *weight);
+        for (weight, x) in groups.of[g].weights.iter_mut().zip([hit.u, hit.v]) {
+            *weight = select(wins, x * inverse, *weight);
         }
         any |= wins.any();
     }

@@ -127,7 +127,7 @@ impl Slopes {
                 Some(map) => map.vectors(way),
                 None => way,
             };
-            let per_depth = V::constant(1.0) / groups.of[g].speed;
+            let per_depth = groups.of[g].slowness;
             self.per_axis[g] = map3(direction, |d| {
                 let d = d * per_depth;
                 V::constant(1.0) / select(d.abs().cmp_lt(least), least, d)
