@@ -53,6 +53,8 @@ pub struct Bundle<'a> {
     pub slack: f32,
     /// Start or end.
     pub shared: Shared,
+    /// All segments are whole rays, from 0 on without an end.
+    pub endless: bool,
     /// Groups of 16 rays.
     pub len: usize,
     /// Per group: lanes that are traced from the apex.
@@ -115,6 +117,8 @@ impl<'a> Bundle<'a> {
         }
         let apex = map3(self.apex, V::splat);
         let (least, most) = (V::splat(3.0 * TAME.0), V::splat(TAME.1));
+        let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
+        let mut endless = infinite.cmp_eq(infinite);
         for g in 0..self.len {
             prefetch_rays(rays, self.first + (g + AHEAD) * V::N);
             let at = self.first + g * V::N;
@@ -123,10 +127,12 @@ impl<'a> Bundle<'a> {
             let size = dir[0].abs() + dir[1].abs() + dir[2].abs();
             let plain = org[0].cmp_eq(apex[0]) & org[1].cmp_eq(apex[1]) & org[2].cmp_eq(apex[2]);
             let plain = plain & least.cmp_le(size) & size.cmp_le(most);
-            if (plain & V::constant(0.0).cmp_le(t_min) & t_min.cmp_le(t_max)).bits() != V::ALL {
+            if (plain & zero.cmp_le(t_min) & t_min.cmp_le(t_max)).bits() != V::ALL {
                 return false;
             }
+            endless = endless & zero.cmp_eq(t_min) & infinite.cmp_eq(t_max);
         }
+        self.endless = endless.bits() == V::ALL;
         self.tame[..self.len].fill(V::ALL);
         true
     }
@@ -139,6 +145,7 @@ impl<'a> Bundle<'a> {
             apex: [0.0; 3],
             slack: 0.0,
             shared: Shared::Start,
+            endless: false,
             len,
             tame: [0; GROUPS],
             odd: [0; GROUPS],
@@ -158,7 +165,8 @@ impl<'a> Bundle<'a> {
         let mut tame = [0; GROUPS];
         tame.iter_mut().zip(&pencil.live).for_each(|(tame, live)| *tame = u32::from(*live));
         let source = Source::Pencil(pencil, middle);
-        let bundle = Self { source, first: 0, apex, slack: 0.0, shared: Shared::Start, len, tame, odd: [0; GROUPS] };
+        let shared = Shared::Start;
+        let bundle = Self { source, first: 0, apex, slack: 0.0, shared, endless: true, len, tame, odd: [0; GROUPS] };
         is_tame.then_some(bundle)
     }
 

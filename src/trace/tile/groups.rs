@@ -297,7 +297,6 @@ impl Groups {
             let fit = s.abs().cmp_lt(V::splat(WIDEST)) & t.abs().cmp_lt(V::splat(WIDEST));
             return Lines { s, t, slowness, far: zero, near, fit: fit.bits(), reach: zero, behind: zero };
         }
-        let [t_min, t_max] = bundle.ends(g);
         let direction = bundle.ways(g);
         let [x, y, speed] = self.frame.coordinates(direction);
         let slowness = one / speed;
@@ -306,6 +305,11 @@ impl Groups {
         let mut fit = s.abs().cmp_lt(widest) & t.abs().cmp_lt(widest);
         fit = fit & zero.cmp_lt(speed) & zero.cmp_lt(slowness) & slowness.cmp_lt(most);
         let mut behind = zero;
+        if bundle.endless {
+            let near = V::splat(f32::INFINITY);
+            return Lines { s, t, slowness, far: zero, near, fit: fit.bits(), reach: zero, behind };
+        }
+        let [t_min, t_max] = bundle.ends(g);
         let (far, near, reach) = match bundle.shared {
             Shared::Behind => {
                 let starts = bundle.starts(g);

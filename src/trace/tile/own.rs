@@ -320,13 +320,16 @@ impl Groups {
     fn own_numbers(&self, g: usize, bundle: &Bundle) -> (Mask, V, V, V) {
         let found = Mask::from_bits(!positions(&self.of[g].slot, NO_SLOT));
         let depth = V::constant(1.0) / self.of[g].inv_lo;
-        let [t_min, t_max] = bundle.ends(g);
         let mut t = depth * self.of[g].slowness;
         if self.is_behind {
             t = t * self.ahead[g];
         }
+        if !bundle.endless {
+            let [t_min, t_max] = bundle.ends(g);
+            t = t_min.fast_max(t_max.fast_min(t));
+        }
         let [u, v] = self.of[g].weights.map(|w| select(found, w * depth, V::constant(0.0)));
-        (found, t_min.fast_max(t_max.fast_min(t)), u, v)
+        (found, t, u, v)
     }
 
     /// Writes a group's own hits and misses. `past`: past the caches.
