@@ -11,6 +11,14 @@ use super::{GROUPS, HALF_ULP, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
 use crate::math::{Aabb, Affine};
 
+/// Most groups that are worth a test of a box, for the nearest hit and for any: more of them rarely miss it all.
+const MOST: [u32; 2] = [4, 24];
+
+/// What a group that misses a box saves, and what the test of one costs, in triangle tests; a call costs as much as one more.
+const SAVED: i32 = 8;
+/// See [`SAVED`].
+const COST: i32 = 4;
+
 /// The score stays within these.
 const SCORES: (i32, i32) = (-50, 400);
 
@@ -75,7 +83,7 @@ impl Slabs {
     /// Whether to test a box that `groups` meet.
     #[inline(always)]
     pub fn wanted<const ANY: bool>(&self, groups: u64) -> bool {
-        self.score > 0 && (ANY || groups.count_ones() <= 4)
+        self.score > 0 && groups.count_ones() <= MOST[usize::from(ANY)]
     }
 
     /// `pairs` of triangles and groups were tested, `found` of them gave something.
@@ -122,7 +130,7 @@ impl Slabs {
             })
         };
         let (tested, culled) = (wanted.count_ones() as i32, (wanted & !met).count_ones() as i32);
-        self.add(8 * culled - 2 * tested);
+        self.add(SAVED * culled - COST * (tested + 1));
         met
     }
 }
