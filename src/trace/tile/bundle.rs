@@ -53,8 +53,8 @@ pub struct Bundle<'a> {
     pub slack: f32,
     /// Start or end.
     pub shared: Shared,
-    /// All segments are whole rays, from 0 on without an end.
-    pub endless: bool,
+    /// That they are tame and start in one point is still to be seen.
+    pub presumed: bool,
     /// Groups of 16 rays.
     pub len: usize,
     /// Per group: lanes that are traced from the apex.
@@ -94,9 +94,6 @@ impl<'a> Bundle<'a> {
     #[inline(always)]
     pub fn find<const N: usize>(rays: &'a Rays<f32>, first: usize, any: bool) -> Option<Self> {
         let mut bundle = Self::unsorted(rays, first, groups::<N>(rays, first));
-        if bundle.starts_plainly(rays) {
-            return Some(bundle);
-        }
         // Most rays without a common point show it within the first group.
         let len = std::mem::replace(&mut bundle.len, 1);
         bundle.sort_lanes(rays, 0);
@@ -108,33 +105,28 @@ impl<'a> Bundle<'a> {
         bundle.share(rays, any).then_some(bundle)
     }
 
-    /// Whether all rays are tame and start in one point, told in one look at them; what it says no to may be so all the same.
+    /// `N` sets of rays that all start in one point, as far as the first group tells: who loads them looks at the others
+    /// ([`Self::is_plain`]). `None` if they do not.
     #[inline(always)]
-    fn starts_plainly(&mut self, rays: &Rays<f32>) -> bool {
-        self.apex = rays.org(self.first);
-        if !self.apex.iter().all(|x| x.abs() <= TAME.1) {
-            return false;
-        }
-        let apex = map3(self.apex, V::splat);
+    pub fn presumed<const N: usize>(rays: &'a Rays<f32>, first: usize) -> Option<Self> {
+        let mut bundle = Self::unsorted(rays, first, groups::<N>(rays, first));
+        bundle.apex = rays.org(first);
+        bundle.tame[..bundle.len].fill(V::ALL);
+        bundle.presumed = true;
+        let is_tame = bundle.apex.iter().all(|x| x.abs() <= TAME.1);
+        (is_tame && bundle.is_plain(0, bundle.ways(0), bundle.ends(0)).bits() == V::ALL).then_some(bundle)
+    }
+
+    /// Lanes of a group that are surely tame and start in the common point.
+    #[inline(always)]
+    pub fn is_plain(&self, g: usize, dir: Lanes3<V>, [t_min, t_max]: [V; 2]) -> Mask {
+        let Source::Batch(rays) = self.source else { return Mask::from_bits(V::ALL) };
+        let org = load3(&rays.org, self.first + g * V::N);
+        let size = dir[0].abs() + dir[1].abs() + dir[2].abs();
+        let same = |a: usize| org[a].cmp_eq(V::splat(self.apex[a]));
         let (least, most) = (V::splat(3.0 * TAME.0), V::splat(TAME.1));
-        let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
-        let mut endless = infinite.cmp_eq(infinite);
-        for g in 0..self.len {
-            prefetch_rays(rays, self.first + (g + AHEAD) * V::N);
-            let at = self.first + g * V::N;
-            let (org, dir) = (load3(&rays.org, at), load3(&rays.dir, at));
-            let (t_min, t_max) = (V::load(&rays.t_min[at..]), V::load(&rays.t_max[at..]));
-            let size = dir[0].abs() + dir[1].abs() + dir[2].abs();
-            let plain = org[0].cmp_eq(apex[0]) & org[1].cmp_eq(apex[1]) & org[2].cmp_eq(apex[2]);
-            let plain = plain & least.cmp_le(size) & size.cmp_le(most);
-            if (plain & zero.cmp_le(t_min) & t_min.cmp_le(t_max)).bits() != V::ALL {
-                return false;
-            }
-            endless = endless & zero.cmp_eq(t_min) & infinite.cmp_eq(t_max);
-        }
-        self.endless = endless.bits() == V::ALL;
-        self.tame[..self.len].fill(V::ALL);
-        true
+        let fits = least.cmp_le(size) & size.cmp_le(most) & V::constant(0.0).cmp_le(t_min) & t_min.cmp_le(t_max);
+        same(0) & same(1) & same(2) & fits
     }
 
     /// Groups of rays, nothing known of them.
@@ -145,7 +137,7 @@ impl<'a> Bundle<'a> {
             apex: [0.0; 3],
             slack: 0.0,
             shared: Shared::Start,
-            endless: false,
+            presumed: false,
             len,
             tame: [0; GROUPS],
             odd: [0; GROUPS],
@@ -166,7 +158,8 @@ impl<'a> Bundle<'a> {
         tame.iter_mut().zip(&pencil.live).for_each(|(tame, live)| *tame = u32::from(*live));
         let source = Source::Pencil(pencil, middle);
         let shared = Shared::Start;
-        let bundle = Self { source, first: 0, apex, slack: 0.0, shared, endless: true, len, tame, odd: [0; GROUPS] };
+        let odd = [0; GROUPS];
+        let bundle = Self { source, first: 0, apex, slack: 0.0, shared, presumed: false, len, tame, odd };
         is_tame.then_some(bundle)
     }
 
@@ -214,6 +207,14 @@ impl<'a> Bundle<'a> {
                 let dir = pencil.directions(self.first / V::N + g).map(V::new);
                 (Packet::new(org, dir, V::constant(0.0)), V::splat(f32::INFINITY))
             }
+        }
+    }
+
+    /// Asks the memory for the rays of a group.
+    #[inline(always)]
+    pub fn prefetch(&self, g: usize) {
+        if let Source::Batch(rays) = self.source {
+            prefetch_rays(rays, self.first + g * V::N);
         }
     }
 

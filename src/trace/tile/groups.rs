@@ -1,6 +1,6 @@
 //! The rays of a tile: up to 64 groups of 16 (4x4 pixels), each ray as (s, t), its depth as 1/z between two bounds.
 
-use super::bundle::{At, Bundle, Shared, Source};
+use super::bundle::{AHEAD, At, Bundle, Shared, Source};
 use super::frame::Frame;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::words::{least, row_minima};
@@ -70,6 +70,8 @@ pub struct Groups {
     pub many: bool,
     /// In such worlds: instance of the best hit, or [`NO_SLOT`].
     pub inst: [[u32; 16]; GROUPS],
+    /// All segments are whole rays, from 0 on without an end.
+    pub endless: bool,
     /// Some segment ends before the common point.
     pub ends_early: bool,
     /// The common point is behind where segments start.
@@ -113,6 +115,7 @@ impl Default for Groups {
             of: [Group::default(); GROUPS],
             many: false,
             inst: [[NO_SLOT; 16]; GROUPS],
+            endless: false,
             ends_early: false,
             is_behind: false,
             behind: [V::splat(0.0); GROUPS],
@@ -150,6 +153,8 @@ struct Lines {
     reach: V,
     /// See [`Groups::behind`].
     behind: V,
+    /// See [`Groups::endless`].
+    whole: bool,
 }
 
 impl Groups {
@@ -171,6 +176,7 @@ impl Groups {
         }
         let most = V::splat(f32::INFINITY);
         let (mut near, mut reach, mut front) = (most, V::splat(0.0), most);
+        self.endless = true;
         for q in 0..N {
             let mut lows = [[most; SET]; 2];
             // Greatest values as least negatives: one kind of shuffle tree does both.
@@ -182,7 +188,11 @@ impl Groups {
                     (self.of[g].inv_lo, self.of[g].inv_hi) = (most, most);
                     continue;
                 }
+                if bundle.presumed {
+                    bundle.prefetch(g + AHEAD);
+                }
                 let lines = self.lines(bundle, g);
+                self.endless &= lines.whole;
                 let tame = bundle.tame[g];
                 if tame & !lines.fit != 0 {
                     return false;
@@ -295,7 +305,7 @@ impl Groups {
             let (s, t) = (V::new(s), V::new(t));
             let (slowness, near) = (V::splat(1.0 / self.frame.scale), V::splat(f32::INFINITY));
             let fit = s.abs().cmp_lt(V::splat(WIDEST)) & t.abs().cmp_lt(V::splat(WIDEST));
-            return Lines { s, t, slowness, far: zero, near, fit: fit.bits(), reach: zero, behind: zero };
+            return Lines { s, t, slowness, far: zero, near, fit: fit.bits(), reach: zero, behind: zero, whole: true };
         }
         let direction = bundle.ways(g);
         let [x, y, speed] = self.frame.coordinates(direction);
@@ -305,11 +315,15 @@ impl Groups {
         let mut fit = s.abs().cmp_lt(widest) & t.abs().cmp_lt(widest);
         fit = fit & zero.cmp_lt(speed) & zero.cmp_lt(slowness) & slowness.cmp_lt(most);
         let mut behind = zero;
-        if bundle.endless {
-            let near = V::splat(f32::INFINITY);
-            return Lines { s, t, slowness, far: zero, near, fit: fit.bits(), reach: zero, behind };
-        }
         let [t_min, t_max] = bundle.ends(g);
+        if bundle.presumed {
+            fit = fit & bundle.is_plain(g, direction, [t_min, t_max]);
+        }
+        let infinite = V::splat(f32::INFINITY);
+        let whole = bundle.shared == Shared::Start && (zero.cmp_eq(t_min) & infinite.cmp_eq(t_max)).bits() == V::ALL;
+        if whole {
+            return Lines { s, t, slowness, far: zero, near: infinite, fit: fit.bits(), reach: zero, behind, whole };
+        }
         let (far, near, reach) = match bundle.shared {
             Shared::Behind => {
                 let starts = bundle.starts(g);
@@ -332,7 +346,7 @@ impl Groups {
                 (slowness / start, slowness / zero.fast_max(end), size)
             }
         };
-        Lines { s, t, slowness, far, near, fit: fit.bits(), reach, behind }
+        Lines { s, t, slowness, far, near, fit: fit.bits(), reach, behind, whole }
     }
 
     /// The smallest values of some linear functions over the tile's rectangle.

@@ -171,6 +171,9 @@ impl<'a> Job<'a> {
                 self.leave::<SETS>(first);
                 continue;
             }
+            if self.most == GROUPS && self.presumed::<ANY, EXACT, COUNT>(first) {
+                continue;
+            }
             if self.most == GROUPS
                 && let Some(bundle) = Bundle::find::<SETS>(self.rays, first, ANY)
             {
@@ -202,6 +205,16 @@ impl<'a> Job<'a> {
         job.run::<V, ANY, COUNT>(starts.iter().copied());
         self.memory.rest = starts;
         self.memory.rest.clear();
+    }
+
+    /// Traces a block whose rays all start in one point, as most do, after one look at them; false if they do not, or spread
+    /// too wide.
+    fn presumed<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, first: usize) -> bool {
+        let Some(bundle) = Bundle::presumed::<SETS>(self.rays, first) else { return false };
+        match bundle.len <= SET {
+            true => self.tile::<1, ANY, EXACT, COUNT>(&bundle, bundle.groups()),
+            false => self.tile::<SETS, ANY, EXACT, COUNT>(&bundle, bundle.groups()),
+        }
     }
 
     /// Traces a pencil as one tile; false if that cannot be.

@@ -324,7 +324,7 @@ impl Groups {
         if self.is_behind {
             t = t * self.ahead[g];
         }
-        if !bundle.endless {
+        if !self.endless {
             let [t_min, t_max] = bundle.ends(g);
             t = t_min.fast_max(t_max.fast_min(t));
         }

@@ -105,9 +105,7 @@ impl Slabs {
         let lo = each(|a| V::splat(bounds.lo[a] - space.apex[a] - space.margin));
         let hi = each(|a| V::splat(bounds.hi[a] - space.apex[a] + space.margin));
         let more = V::splat(1.0 + 16.0 * HALF_ULP);
-        let is_met = |g: usize, near: V, far: V| {
-            (near.cmp_le(far) & (near * groups.of[g].inv_lo).cmp_le(more)).any()
-        };
+        let is_met = |g: usize, near: V, far: V| (near.cmp_le(far) & (near * groups.of[g].inv_lo).cmp_le(more)).any();
         let down = slopes.down.map(|down| down & wanted);
         let met = if slopes.mixed & wanted == 0 && down.iter().all(|&down| down == 0 || down == wanted) {
             // Which side of the box comes first is the same for all rays.
