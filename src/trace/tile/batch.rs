@@ -37,7 +37,7 @@ const LEAST_VOLUME: f32 = 1e-30;
 /// distance.
 const MOST_SHIFT: f32 = 10.0 * HALF_ULP;
 
-/// What weights (which add up to one) must be of their error.
+/// Weights add up to one: that must be this many times their error.
 const LEAST_SUM: f32 = 8.0;
 
 /// A distance between the apex and a plane is certain beyond this part of the products it is made of.
