@@ -322,7 +322,7 @@ impl Groups {
         let depth = V::constant(1.0) / self.of[g].inv_lo;
         let mut t = depth * self.of[g].slowness;
         if self.is_behind {
-            t = t * self.ahead[g];
+            t *= self.ahead[g];
         }
         if !self.endless {
             let [t_min, t_max] = bundle.ends(g);
