@@ -36,15 +36,11 @@ struct Slopes {
     /// Depth per unit of each axis, by group; valid where `ready` says so.
     per_axis: [Lanes3<V>; GROUPS],
     ready: u64,
-    /// Groups whose rays all go down an axis.
-    down: [u64; 3],
-    /// Groups whose rays go up and down some axis.
-    mixed: u64,
 }
 
 impl Default for Slopes {
     fn default() -> Self {
-        Self { per_axis: [[V::splat(0.0); 3]; GROUPS], ready: 0, down: [0; 3], mixed: 0 }
+        Self { per_axis: [[V::splat(0.0); 3]; GROUPS], ready: 0 }
     }
 }
 
@@ -105,44 +101,23 @@ impl Slabs {
         let lo = each(|a| V::splat(bounds.lo[a] - space.apex[a] - space.margin));
         let hi = each(|a| V::splat(bounds.hi[a] - space.apex[a] + space.margin));
         let more = V::splat(1.0 + 16.0 * HALF_ULP);
-        let is_met = |g: usize, near: V, far: V| (near.cmp_le(far) & (near * groups.of[g].inv_lo).cmp_le(more)).any();
-        let down = slopes.down.map(|down| down & wanted);
-        let met = if slopes.mixed & wanted == 0 && down.iter().all(|&down| down == 0 || down == wanted) {
-            // Which side of the box comes first is the same for all rays.
-            let first = each(|a| if down[a] == 0 { lo[a] } else { hi[a] });
-            let last = each(|a| if down[a] == 0 { hi[a] * more } else { lo[a] * more });
-            those(wanted, |g| {
-                let [x, y, z] = slopes.per_axis[g];
-                let near = (first[0] * x).fast_max(first[1] * y).fast_max(first[2] * z);
-                let far = (last[0] * x).fast_min(last[1] * y).fast_min(last[2] * z);
-                is_met(g, near, far)
-            })
-        } else {
-            those(wanted, |g| {
-                let [x, y, z] = each(|a| {
-                    let (one, other) = (lo[a] * slopes.per_axis[g][a], hi[a] * slopes.per_axis[g][a]);
-                    (one.fast_min(other), one.fast_max(other))
-                });
-                let near = x.0.fast_max(y.0).fast_max(z.0.fast_max(V::splat(0.0)));
-                is_met(g, near, x.1.fast_min(y.1).fast_min(z.1) * more)
-            })
-        };
+        let (mut met, mut rest) = (0, wanted);
+        while rest != 0 {
+            let g = rest.trailing_zeros() as usize & (GROUPS - 1);
+            rest &= rest - 1;
+            let [x, y, z] = each(|a| {
+                let (one, other) = (lo[a] * slopes.per_axis[g][a], hi[a] * slopes.per_axis[g][a]);
+                (one.fast_min(other), one.fast_max(other))
+            });
+            let near = x.0.fast_max(y.0).fast_max(z.0.fast_max(V::splat(0.0)));
+            let far = x.1.fast_min(y.1).fast_min(z.1) * more;
+            let hit = near.cmp_le(far) & (near * groups.of[g].inv_lo).cmp_le(more);
+            met |= u64::from(hit.any()) << g;
+        }
         let (tested, culled) = (wanted.count_ones() as i32, (wanted & !met).count_ones() as i32);
         self.add(SAVED * culled - COST * (tested + 1));
         met
     }
-}
-
-/// Of `wanted` groups, those that `is_one`.
-#[inline(always)]
-fn those(wanted: u64, is_one: impl Fn(usize) -> bool) -> u64 {
-    let (mut all, mut rest) = (0, wanted);
-    while rest != 0 {
-        let g = rest.trailing_zeros() as usize & (GROUPS - 1);
-        rest &= rest - 1;
-        all |= u64::from(is_one(g)) << g;
-    }
-    all
 }
 
 impl Slopes {
@@ -150,8 +125,6 @@ impl Slopes {
     #[inline(always)]
     fn prepare(&mut self, groups: &Groups, bundle: &Bundle, space: &Space, mut missing: u64) {
         self.ready |= missing;
-        self.mixed &= !missing;
-        self.down.iter_mut().for_each(|down| *down &= !missing);
         // Far below the margin of the boxes, far above what overflows.
         let least = V::splat(1e-10 * space.extent);
         while missing != 0 {
@@ -167,11 +140,6 @@ impl Slopes {
                 let d = d * per_depth;
                 V::constant(1.0) / select(d.abs().cmp_lt(least), least, d)
             });
-            for a in 0..3 {
-                let down = self.per_axis[g][a].cmp_lt(V::constant(0.0)).bits() & bundle.tame[g];
-                self.down[a] |= u64::from(down != 0) << g;
-                self.mixed |= u64::from(down != 0 && down != bundle.tame[g]) << g;
-            }
         }
     }
 }
