@@ -9,7 +9,7 @@
 //! to rounding (Ize, "Robust BVH ray traversal", JCGT 2(2), 2013).
 
 use super::packet::Packet;
-use crate::lanes::{Lanes, Lanes3, Real, each};
+use crate::lanes::{Lanes, Lanes3, Real, each, map3};
 
 /// Where lines pass through a box, before the ray's segment is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +21,7 @@ pub struct Interval<V> {
 }
 
 /// Relative padding of the far side, in half ulps: 3 roundings on either side, doubled.
-const PAD: f64 = 8.0;
+pub const PAD: f64 = 8.0;
 
 impl<V: Lanes> Interval<V> {
     /// `N` rays against one box.
@@ -33,9 +33,15 @@ impl<V: Lanes> Interval<V> {
     /// `N` lines, given by origin and [`crate::lanes::finite_rcp`] of the direction, against one box.
     #[inline(always)]
     pub fn of_line(org: Lanes3<V>, rcp: Lanes3<V>, lo: [V::Scalar; 3], hi: [V::Scalar; 3]) -> Self {
+        Self::of_boxes(org, rcp, map3(lo, V::splat), map3(hi, V::splat))
+    }
+
+    /// The same with a box per lane.
+    #[inline(always)]
+    pub fn of_boxes(org: Lanes3<V>, rcp: Lanes3<V>, lo: Lanes3<V>, hi: Lanes3<V>) -> Self {
         let [x, y, z] = each(|a| {
-            let t0 = (V::splat(lo[a]) - org[a]) * rcp[a];
-            let t1 = (V::splat(hi[a]) - org[a]) * rcp[a];
+            let t0 = (lo[a] - org[a]) * rcp[a];
+            let t1 = (hi[a] - org[a]) * rcp[a];
             (t0.fast_min(t1), t0.fast_max(t1))
         });
         let near = x.0.fast_max(y.0).fast_max(z.0);

@@ -17,6 +17,7 @@
 use glam::DVec3;
 
 use super::block::{BLOCK, Block};
+use super::facts::Facts;
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, map3};
 use crate::math::Aabb;
 use crate::ray::slab::{Interval, pad};
@@ -140,7 +141,8 @@ impl Triangle {
             let i = wanted.trailing_zeros() as usize & (BLOCK - 1);
             wanted &= wanted - 1;
             let maybe = V::Mask::from_bits(maybe[i]);
-            let candidate = Self::accept(packet, &block.get(i), maybe, edges(i).functions);
+            let n = block.get(i);
+            let candidate = Self::accept(packet, &Facts::of(&n), maybe, edges(i).functions, true, |_| n);
             found(&candidate, lanes, block.prim[i]);
         }
     }
@@ -156,35 +158,51 @@ impl Triangle {
         ((!(edges.outside() | aside)).bits(), edges.functions)
     }
 
-    /// One ray against one of its [`Triangle::candidates`], whose edge functions it has there.
+    /// One ray, the same in all lanes, against those of its [`Triangle::candidates`] whose bits are set in `slots`; `edges`: their
+    /// edge functions, `facts`: those of the block. `flat`: whether the ray may be [`Triangle::along_a_face`].
     #[inline(always)]
-    pub fn look_closer<S: Real>(ray: &Packet<S>, numbers: &[S; 9], edges: [S; 3]) -> Candidate<S> {
-        Self::accept(ray, numbers, true, edges)
+    pub fn look_closer<S: Real>(
+        ray: &Packet<S::Octo>,
+        block: &TriangleBlock<S>,
+        facts: &Facts<S::Octo>,
+        slots: u32,
+        edges: [S::Octo; 3],
+        flat: bool,
+    ) -> Candidate<S::Octo> {
+        let maybe = <S::Octo as Lanes>::Mask::from_bits(slots);
+        Self::accept(ray, facts, maybe, edges, flat, |slot| block.get(slot))
     }
 
-    /// Depth, weights and segment of lanes that are not outside the triangle.
+    /// Depth, weights and segment of lanes that are not outside the triangle. `numbers(i)`: the triangle of lane `i`.
     #[inline(always)]
-    fn accept<V: Lanes>(packet: &Packet<V>, n: &[V::Scalar; 9], maybe: V::Mask, [u, v, w]: [V; 3]) -> Candidate<V> {
+    fn accept<V: Lanes>(
+        packet: &Packet<V>,
+        facts: &Facts<V>,
+        maybe: V::Mask,
+        [u, v, w]: [V; 3],
+        flat: bool,
+        numbers: impl Fn(usize) -> [V::Scalar; 9],
+    ) -> Candidate<V> {
         let det = u + v + w;
         let inv = V::constant(1.0) / det;
-        let plane = map3(unit_normal(n), |x| V::splat(V::Scalar::from_f64(x)));
-        let corner = each(|a| V::splat(n[a]) - packet.org[a]);
-        let t = dot(plane, corner) / dot(plane, packet.dir);
+        let corner = each(|a| facts.corner[a] - packet.org[a]);
+        let t = dot(facts.normal, corner) / dot(facts.normal, packet.dir);
         let mut found = Candidate { hit: maybe, t, u: v * inv, v: w * inv };
-        let own = Self::bounds(n);
-        let interval = Interval::of(packet, own.lo, own.hi);
+        let interval = Interval::of_boxes(packet.org, packet.rcp, facts.lo, facts.hi);
         found.hit = maybe & interval.near.cmp_le(interval.far);
         let size = det.abs();
         let sound = V::constant(Self::least_det::<V::Scalar>()).cmp_le(size) & size.cmp_le(V::splat(V::Scalar::MAX));
         let doubtful = (found.hit & !sound).bits();
         if doubtful != 0 {
-            found = Self::restart(packet, n, found, doubtful);
+            found = Self::restart(packet, &numbers, found, doubtful);
         }
-        let zero = V::constant(0.0);
-        let flat = Self::along_a_face(packet);
-        let end = V::select(interval.far.cmp_eq(zero) & flat, found.t, interval.far);
-        let behind = found.t.cmp_lt(zero) & zero.cmp_le(packet.t_min);
-        found.hit = found.hit & !(flat & interval.near.cmp_eq(zero) & behind);
+        let mut end = interval.far;
+        if flat {
+            let (zero, flat) = (V::constant(0.0), Self::along_a_face(packet.dir));
+            end = V::select(interval.far.cmp_eq(zero) & flat, found.t, end);
+            let behind = found.t.cmp_lt(zero) & zero.cmp_le(packet.t_min);
+            found.hit = found.hit & !(flat & interval.near.cmp_eq(zero) & behind);
+        }
         found.t = packet.t_floor.fast_max(interval.near.fast_max(found.t.fast_min(end)));
         // A parameter that overflowed is no hit: it would tie with the end of an infinite segment.
         let finite = found.t.abs().cmp_le(V::splat(V::Scalar::MAX));
@@ -196,8 +214,8 @@ impl Triangle {
     /// Lanes with a direction component of zero. A line in the upper face of a box has its interval end at 0 there
     /// (`0 * rcp`), one in the lower face has it begin at 0, and neither says anything about where the triangle is.
     #[inline(always)]
-    fn along_a_face<V: Lanes>(packet: &Packet<V>) -> V::Mask {
-        let [x, y, z] = map3(packet.dir, |d| d.abs().cmp_lt(V::splat(V::Scalar::MIN_POSITIVE)));
+    pub fn along_a_face<V: Lanes>(dir: Lanes3<V>) -> V::Mask {
+        let [x, y, z] = map3(dir, |d| d.abs().cmp_lt(V::splat(V::Scalar::MIN_POSITIVE)));
         x | y | z
     }
 
@@ -211,7 +229,12 @@ impl Triangle {
     /// huge coordinates, and triangles seen exactly edge-on (which are misses).
     #[cold]
     #[inline(never)]
-    fn restart<V: Lanes>(packet: &Packet<V>, n: &[V::Scalar; 9], mut found: Candidate<V>, lanes: u32) -> Candidate<V> {
+    fn restart<V: Lanes>(
+        packet: &Packet<V>,
+        numbers: &impl Fn(usize) -> [V::Scalar; 9],
+        mut found: Candidate<V>,
+        lanes: u32,
+    ) -> Candidate<V> {
         let mut hit = found.hit.bits() & !lanes;
         for lane in 0..V::N {
             if lanes >> lane & 1 == 0 {
@@ -219,7 +242,7 @@ impl Triangle {
             }
             let read = |v: [V; 3]| DVec3::from_array(v.map(|x| x.lane(lane).to_f64()));
             let (org, dir) = (read(packet.org), read(packet.dir));
-            if let Some((t, u, v)) = edge_test_f64(org, dir, Self::corners(n)) {
+            if let Some((t, u, v)) = edge_test_f64(org, dir, Self::corners(&numbers(lane))) {
                 let only = V::Mask::from_bits(1 << lane);
                 let put = |x: f64, old: V| V::select(only, V::constant(x), old);
                 (found.t, found.u, found.v) = (put(t, found.t), put(u, found.u), put(v, found.v));
@@ -235,28 +258,6 @@ impl Triangle {
         let [a, b, c] = Self::corners(numbers);
         (b - a).cross(c - a)
     }
-}
-
-/// Normal of a triangle, scaled by a power of two to a largest component of about 1, accurate to a few ulps for any sliver: products of f32
-/// differences are exact in f64, those of f64 differences are paired with their rounding errors (Kahan's difference
-/// of products; Jeannerod, Louvet, Muller, "Further analysis of Kahan's algorithm", Math. Comp. 82, 2013).
-#[inline(always)]
-fn unit_normal<S: Real>(n: &[S; 9]) -> [f64; 3] {
-    let edge = |i: usize| each(|a| n[i + a].to_f64() - n[a].to_f64());
-    let (p, q) = (edge(3), edge(6));
-    let minor = |a: usize, b: usize| {
-        if S::EPSILON.to_f64() > f64::EPSILON {
-            p[a] * q[b] - p[b] * q[a]
-        } else {
-            let product = p[b] * q[a];
-            let error = (-p[b]).mul_add(q[a], product);
-            p[a].mul_add(q[b], -product) + error
-        }
-    };
-    let normal = [minor(1, 2), minor(2, 0), minor(0, 1)];
-    let exponent = normal[0].abs().max(normal[1].abs()).max(normal[2].abs()).to_bits() >> 52;
-    let scale = f64::from_bits((2046 - exponent.min(2045)) << 52);
-    map3(normal, |x| x * scale)
 }
 
 /// The components along an axis and the two that follow it.

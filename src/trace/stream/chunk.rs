@@ -7,13 +7,16 @@ use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, map3};
 use crate::ray::slab::Interval;
 use crate::ray::{Candidate, HitPacket, Hits, INVALID_ID, Packet, Rays};
 use crate::scene::world::Instance;
-use crate::shape::{Turned, around};
+use crate::shape::{BLOCK, Triangle, Turned, around};
 
 /// Most rays in a chunk: one bit each in a [`Set`].
 pub const RAYS: usize = 128;
 
 /// A set of rays of a chunk.
 pub type Set = u128;
+
+/// How far a `shift` is moved, in half ulps: two roundings, doubled.
+const SLACK: f64 = 4.0;
 
 /// Up to this many rays go into an instance one by one.
 const FEW: u32 = 4;
@@ -30,6 +33,9 @@ pub struct Chunk<S> {
     pub dir: [[S; RAYS]; 3],
     /// Finite reciprocals of the directions.
     pub rcp: [[S; RAYS]; 3],
+    /// Origins times reciprocals, at least and at most: what near and far planes of boxes are moved by where every node counts (see
+    /// [`super::node`]).
+    pub shift: [[[S; RAYS]; 3]; 2],
     /// See [`Packet::shear`].
     pub shear: [[S; RAYS]; 3],
     /// Start of the segments.
@@ -40,6 +46,10 @@ pub struct Chunk<S> {
     pub axis: [u8; RAYS],
     /// Rays with each dominant axis.
     pub dominant: [Set; 3],
+    /// Whether some ray may be [`Triangle::along_a_face`].
+    pub flat: bool,
+    /// Whether some `shift` is too large to compute with.
+    pub steep: bool,
     /// Sum of the directions.
     pub mean: [S; 3],
     /// Number of rays.
@@ -70,11 +80,14 @@ impl<S: Real> Default for Chunk<S> {
             around: [zero; 3],
             dir: [zero; 3],
             rcp: [zero; 3],
+            shift: [[zero; 3]; 2],
             shear: [zero; 3],
             t_min: zero,
             t_floor: zero,
             axis: [0; RAYS],
             dominant: [0; 3],
+            flat: false,
+            steep: false,
             mean: [S::ZERO; 3],
             len: 0,
             bounds: None,
@@ -96,7 +109,7 @@ impl<S: Real> Chunk<S> {
     /// Takes at most [`RAYS`] rays from a batch, which is not empty; the ends of their segments go to `t`.
     #[inline(always)]
     pub fn gather<V: Lanes<Scalar = S>>(&mut self, rays: &Rays<S>, ids: &[u32], t: &mut [S; RAYS]) {
-        self.len = ids.len().min(RAYS);
+        (self.len, self.flat, self.steep) = (ids.len().min(RAYS), false, false);
         // Columns of one known length, so that a ray's number is looked at once instead of eight times.
         let n = rays.padded_len();
         let [ox, oy, oz] = each(|a| &rays.org[a][..n]);
@@ -133,7 +146,7 @@ impl<S: Real> Chunk<S> {
         t: &[S; RAYS],
         rays: Set,
     ) -> Set {
-        (self.len, self.bounds) = (from.len, None);
+        (self.len, self.bounds, self.flat, self.steep) = (from.len, None, false, false);
         let mut inside = 0;
         if rays.count_ones() <= FEW {
             let mut rest = rays;
@@ -191,6 +204,14 @@ impl<S: Real> Chunk<S> {
     #[inline(always)]
     fn put<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>) {
         store3(packet.rcp, &mut self.rcp, at);
+        let product = each(|a| packet.org[a] * packet.rcp[a]);
+        let slack = map3(product, |x| x.abs() * V::constant(SLACK * V::Scalar::EPSILON.to_f64()));
+        store3(each(|a| product[a] + slack[a]), &mut self.shift[0], at);
+        store3(each(|a| product[a] - slack[a]), &mut self.shift[1], at);
+        let most = V::constant(V::Scalar::MAX.to_f64() / 4.0);
+        let [x, y, z] = map3(product, |x| x.abs().cmp_le(most));
+        self.steep |= (!(x & y & z)).any();
+        self.flat |= Triangle::along_a_face(packet.dir).any();
         store3(packet.shear, &mut self.shear, at);
         packet.t_floor.store(&mut self.t_floor[at..]);
         let dominant = map3(packet.dominant, V::Mask::from_bits);
@@ -210,6 +231,21 @@ impl<S: Real> Chunk<S> {
         let axis = usize::from(self.axis[ray]);
         let pick = |v: &[[S; RAYS]; 3]| [v[0][ray], v[1][ray], v[2][ray]];
         Turned { axis, org: pick(&self.around), shear: pick(&self.shear), rcp: self.rcp[axis.min(2)][ray] }
+    }
+
+    /// One ray, the same in all lanes.
+    #[inline(always)]
+    pub fn splat(&self, ray: usize) -> Packet<S::Octo> {
+        let splat3 = |v: &[[S; RAYS]; 3]| each(|a| S::Octo::splat(v[a][ray]));
+        Packet {
+            org: splat3(&self.org),
+            dir: splat3(&self.dir),
+            rcp: splat3(&self.rcp),
+            t_min: S::Octo::splat(self.t_min[ray]),
+            t_floor: S::Octo::splat(self.t_floor[ray]),
+            dominant: map3(self.dominant, |mask| if mask >> ray & 1 != 0 { S::Octo::ALL } else { 0 }),
+            shear: splat3(&self.shear),
+        }
     }
 
     /// Rays `at..at + N` as a packet.
@@ -285,22 +321,24 @@ impl<S: Real> Best<S> {
         self.inst[at..at + V::N].copy_from_slice(&hit.inst[..V::N]);
     }
 
-    /// Takes in what a kernel found for one ray. Whether it is nearer is a surprise, so nothing branches on it; ties,
-    /// which are rare, go by [`HitPacket::commit`].
+    /// Takes in what a kernel found for one ray on a block of triangles, those whose bits are set in `wanted`: usually one. The tie
+    /// rule is that of [`HitPacket::commit`].
     #[inline(always)]
-    pub fn take(&mut self, ray: usize, found: &Candidate<S>, prim: u32, inst: u32) {
-        if found.hit && found.t == self.t[ray] {
-            let mut hit = self.packet::<S>(ray);
-            hit.commit(1, found, prim, inst);
-            self.put(ray, &hit);
-            return;
+    pub fn take(&mut self, ray: usize, wanted: u32, found: &Candidate<S::Octo>, prim: &[u32; BLOCK], inst: u32) {
+        let [mut t, mut u, mut v] = [[S::ZERO; BLOCK]; 3];
+        found.t.store(&mut t);
+        found.u.store(&mut u);
+        found.v.store(&mut v);
+        let mut rest = wanted;
+        while rest != 0 {
+            let slot = rest.trailing_zeros() as usize & (BLOCK - 1);
+            rest &= rest - 1;
+            let ties = t[slot] == self.t[ray] && (inst, prim[slot]) < (self.inst[ray], self.prim[ray]);
+            if t[slot] < self.t[ray] || ties {
+                (self.t[ray], self.u[ray], self.v[ray]) = (t[slot], u[slot], v[slot]);
+                (self.prim[ray], self.inst[ray]) = (prim[slot], inst);
+            }
         }
-        let wins = found.hit & (found.t < self.t[ray]);
-        self.t[ray] = S::select(wins, found.t, self.t[ray]);
-        self.u[ray] = S::select(wins, found.u, self.u[ray]);
-        self.v[ray] = S::select(wins, found.v, self.v[ray]);
-        self.prim[ray] = if wins { prim } else { self.prim[ray] };
-        self.inst[ray] = if wins { inst } else { self.inst[ray] };
     }
 
     /// Writes the hits to their places in a batch.

@@ -3,10 +3,10 @@
 use super::chunk::{Chunk, RAYS, Set};
 use super::walk::Walk;
 use crate::bvh::Child;
-use crate::lanes::{Lanes, Real, each};
+use crate::lanes::{LaneMask, Lanes, Real, map3};
 use crate::ray::{HitPacket, Packet};
 use crate::scene::world::{Class, Object};
-use crate::shape::{BLOCK, Triangle};
+use crate::shape::{BLOCK, Facts, Triangle};
 use crate::trace::leaf;
 use crate::trace::query::Query;
 
@@ -89,64 +89,37 @@ fn vector<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
 }
 
-/// Every ray with every triangle, and what is written past the last of them.
-const ROOM: usize = (RAYS + 1) * BLOCK;
-
-/// The set bits of each byte, ascending, then zeros.
-const SET_BITS: [[u8; BLOCK]; 256] = {
-    let mut table = [[0; BLOCK]; 256];
-    let mut mask = 0;
-    while mask < 256 {
-        let (mut bit, mut count) = (0, 0);
-        while bit < BLOCK {
-            if mask >> bit & 1 != 0 {
-                table[mask][count] = bit as u8;
-                count += 1;
-            }
-            bit += 1;
-        }
-        mask += 1;
-    }
-    table
-};
-
-/// Rays of a chunk with triangles of a block that are to be looked at closer.
+/// Rays of a chunk that are to be looked at closer, with which triangles of a block.
 #[derive(Clone, Debug)]
-pub struct Pairs<S> {
-    /// Rays by their order here.
-    turn: [u8; ROOM],
-    slot: [u8; ROOM],
-    len: usize,
-    /// The rays, and their edge functions with all triangles.
-    ray: [u8; RAYS],
+#[repr(C, align(64))]
+pub struct Closer<S> {
+    /// Their edge functions with all triangles.
     edges: [[[S; BLOCK]; 3]; RAYS],
+    ray: [u8; RAYS],
+    slots: [u8; RAYS],
+    len: usize,
 }
 
-impl<S: Real> Default for Pairs<S> {
+impl<S: Real> Default for Closer<S> {
     fn default() -> Self {
-        let edges = [[[S::ZERO; BLOCK]; 3]; RAYS];
-        Self { turn: [0; ROOM], slot: [0; ROOM], len: 0, ray: [0; RAYS], edges }
+        Self { edges: [[[S::ZERO; BLOCK]; 3]; RAYS], ray: [0; RAYS], slots: [0; RAYS], len: 0 }
     }
 }
 
-impl<S: Real> Pairs<S> {
-    /// Adds a ray, the `turn`-th, with the triangles whose bits are set. Always writes eight and takes back those that are too many:
-    /// how many there are is a surprise every time.
+impl<S: Real> Closer<S> {
+    /// Adds a ray with the triangles whose bits are set. Always writes it and takes it back if there are none: whether there are is a
+    /// surprise every time.
     #[inline(always)]
-    fn add(&mut self, turn: usize, ray: usize, slots: u32, edges: [S::Octo; 3]) {
-        let turn = turn & (RAYS - 1);
-        self.ray[turn] = ray as u8;
-        self.edges[turn].iter_mut().zip(edges).for_each(|(to, edge)| edge.store(to));
-        let slots = slots as usize & 0xff;
-        let at = self.len.min(ROOM - BLOCK);
-        self.turn[at..at + BLOCK].copy_from_slice(&[turn as u8; BLOCK]);
-        self.slot[at..at + BLOCK].copy_from_slice(&SET_BITS[slots]);
-        self.len = at + slots.count_ones() as usize;
+    fn add(&mut self, ray: usize, slots: u32, edges: [S::Octo; 3]) {
+        let at = self.len & (RAYS - 1);
+        (self.ray[at], self.slots[at]) = (ray as u8, slots as u8);
+        self.edges[at].iter_mut().zip(edges).for_each(|(to, edge)| edge.store(to));
+        self.len = at + usize::from(slots != 0);
     }
 }
 
-/// One ray after the other against all triangles of the block; then, pair by pair, a closer look at those that it may
-/// hit.
+/// One ray after the other against all triangles of the block; then a closer look by those that may hit some, with what
+/// they need of the triangles computed once.
 #[inline(always)]
 fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
     object: &Object<S>,
@@ -154,35 +127,40 @@ fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
     chunk: &Chunk<S>,
     walk: &mut Walk<S>,
     child: Child,
-    mut rays: Set,
+    rays: Set,
 ) {
     let block = &object.triangles[child.index as usize];
-    let slots = (1 << child.count) - 1;
-    walk.pairs.len = 0;
-    let mut turn = 0;
-    while rays != 0 {
-        let ray = rays.trailing_zeros() as usize & (RAYS - 1);
-        rays &= rays - 1;
-        let (maybe, edges) = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], walk.best.t[ray], block);
-        walk.pairs.add(turn, ray, slots & maybe, edges);
-        turn += 1;
-        if COUNT {
-            walk.counters.leaves += 1;
-            walk.counters.prims += u64::from(child.count);
-            walk.counters.prim_lanes_active += u64::from(child.count);
-            walk.counters.prim_lanes_total += u64::from(child.count);
+    let all = (1 << child.count) - 1;
+    walk.closer.len = 0;
+    for half in 0..2 {
+        let mut rest = (rays >> (64 * half)) as u64;
+        while rest != 0 {
+            let ray = (64 * half + rest.trailing_zeros() as usize) & (RAYS - 1);
+            rest &= rest - 1;
+            let (maybe, edges) = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], walk.best.t[ray], block);
+            walk.closer.add(ray, all & maybe, edges);
+            if COUNT {
+                walk.counters.leaves += 1;
+                walk.counters.prims += u64::from(child.count);
+                walk.counters.prim_lanes_active += u64::from(child.count);
+                walk.counters.prim_lanes_total += u64::from(child.count);
+            }
         }
     }
-    for at in 0..walk.pairs.len.min(ROOM) {
-        let turn = usize::from(walk.pairs.turn[at]) & (RAYS - 1);
-        let (ray, slot) =
-            (usize::from(walk.pairs.ray[turn]) & (RAYS - 1), usize::from(walk.pairs.slot[at]) & (BLOCK - 1));
-        let edges = each(|k| walk.pairs.edges[turn][k][slot]);
-        let found = Triangle::look_closer(&chunk.packet::<S>(ray), &block.get(slot), edges);
+    if walk.closer.len == 0 {
+        return;
+    }
+    let facts = Facts::of_block(block);
+    for at in 0..walk.closer.len.min(RAYS) {
+        let ray = usize::from(walk.closer.ray[at]) & (RAYS - 1);
+        let edges = map3(walk.closer.edges[at], |edge| S::Octo::load(&edge));
+        let slots = walk.closer.slots[at].into();
+        let found = Triangle::look_closer(&chunk.splat(ray), block, &facts, slots, edges, chunk.flat);
+        let wanted = (found.hit & found.t.cmp_le(S::Octo::splat(walk.best.t[ray]))).bits();
         if ANY {
-            walk.best.done |= Set::from(found.hit & (found.t <= walk.best.t[ray])) << ray;
-        } else {
-            walk.best.take(ray, &found, block.prim[slot], inst);
+            walk.best.done |= Set::from(wanted != 0) << ray;
+        } else if wanted != 0 {
+            walk.best.take(ray, wanted, &found, &block.prim, inst);
         }
     }
 }

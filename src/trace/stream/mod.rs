@@ -55,7 +55,7 @@ pub struct Memory<S> {
     local: Chunk<S>,
     best: Best<S>,
     waiting: walk::Pile<S>,
-    pairs: leaf::Pairs<S>,
+    closer: leaf::Closer<S>,
 }
 
 impl<S: Real> Default for Memory<S> {
@@ -67,7 +67,7 @@ impl<S: Real> Default for Memory<S> {
             local: Chunk::default(),
             best: Best::default(),
             waiting: walk::Pile::default(),
-            pairs: leaf::Pairs::default(),
+            closer: leaf::Closer::default(),
         }
     }
 }
@@ -231,7 +231,7 @@ impl<S: Real> Job<'_, S> {
     /// Traces what was sorted, chunk by chunk.
     #[inline(always)]
     fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
-        let Memory { bins, ids, chunk, local, best, waiting, pairs } = &mut *self.memory;
+        let Memory { bins, ids, chunk, local, best, waiting, closer } = &mut *self.memory;
         for octant in 0..OCTANTS {
             ids.clear();
             bins[octant..].iter_mut().step_by(OCTANTS).for_each(|alike| ids.append(alike));
@@ -243,8 +243,8 @@ impl<S: Real> Job<'_, S> {
                 chunk.gather::<V>(self.rays, ids, &mut best.t);
                 best.start();
                 let (stack, counters) = (&mut *self.stack, &mut *self.counters);
-                let (waiting, pairs) = (&mut *waiting, &mut *pairs);
-                let mut walk = walk::Walk { best: &mut *best, waiting, pairs, stack, counters };
+                let (waiting, closer) = (&mut *waiting, &mut *closer);
+                let mut walk = walk::Walk { best: &mut *best, waiting, closer, stack, counters };
                 walk.world::<V, ANY, COUNT>(self.world, chunk, local, octant);
                 match &mut self.output {
                     Output::Closest(hits) => best.scatter(hits, ids),

@@ -65,7 +65,7 @@ pub struct Walk<'a, S> {
     /// Boxes to visit.
     pub waiting: &'a mut Pile<S>,
     /// Room for the closer look at a leaf.
-    pub pairs: &'a mut leaf::Pairs<S>,
+    pub closer: &'a mut leaf::Closer<S>,
     /// For kernels that want one.
     pub stack: &'a mut Stack<S>,
     /// Counters.
