@@ -76,13 +76,24 @@ impl<S: Real> Tree<S> {
 /// Builds a tree over primitives with finite boxes `boxes` and leaf classes `classes` (below 255).
 /// Deterministic: the same input gives the same tree on any number of threads.
 pub fn build<S: Real>(boxes: &[Aabb<S>], classes: &[u8], settings: impl Into<BuildSettings>) -> (Tree<S>, Vec<Leaf>) {
+    build_by_cost(boxes, classes, &[], settings)
+}
+
+/// As [`build`], where a primitive of class `c` costs rays that meet its leaf `each[c]` of what a node costs, or as much as a
+/// triangle if nothing is said: costly ones are kept apart where many rays come.
+pub fn build_by_cost<S: Real>(
+    boxes: &[Aabb<S>],
+    classes: &[u8],
+    each: &[f32],
+    settings: impl Into<BuildSettings>,
+) -> (Tree<S>, Vec<Leaf>) {
     assert_eq!(boxes.len(), classes.len());
     let settings = settings.into();
     let binary = binary::build(boxes, classes, settings);
     if binary.nodes.is_empty() {
         return (Tree::empty(), Vec::new());
     }
-    let plan = Plan::new(&binary, classes, settings.leaf);
+    let plan = Plan::new(&binary, classes, each, settings.leaf);
     let mut emission =
         Emission { binary: &binary, plan: &plan, nodes: Vec::new(), leaves: Vec::new(), blocks: [0; 256] };
     let depth = emission.run();

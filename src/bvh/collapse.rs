@@ -5,7 +5,7 @@
 //! covers its primitives.
 
 use super::binary::Binary;
-use super::cost::Cost;
+use super::cost::{Cost, PRIMITIVE};
 use super::node::{LEAF_PRIMS, WIDTH};
 use crate::lanes::Real;
 use crate::math::Aabb;
@@ -23,6 +23,8 @@ pub struct Plan {
     classes: Vec<u8>,
     /// Most primitives in a leaf.
     most: u32,
+    /// What a primitive costs in a leaf that is met, by class.
+    each: Vec<f32>,
 }
 
 /// Half the area of a box whose extents are scaled first.
@@ -37,14 +39,15 @@ const MIXED: u8 = u8::MAX;
 
 impl Plan {
     /// Plans the collapse of `tree`, whose primitives have the given classes, to leaves of `most` primitives
-    /// (1 to [`LEAF_PRIMS`]).
-    pub fn new<S: Real>(tree: &Binary<S>, class_of: &[u8], most: usize) -> Self {
+    /// (1 to [`LEAF_PRIMS`]). `each`: what a primitive of each class costs, [`PRIMITIVE`] where nothing is said.
+    pub fn new<S: Real>(tree: &Binary<S>, class_of: &[u8], each: &[f32], most: usize) -> Self {
         let nodes = &tree.nodes;
         let mut plan = Self {
             decisions: vec![[0; WIDTH]; nodes.len()],
             counts: vec![1; nodes.len()],
             classes: vec![MIXED; nodes.len()],
             most: most.clamp(1, LEAF_PRIMS) as u32,
+            each: each.to_vec(),
         };
         let mut costs = vec![[0f32; WIDTH]; nodes.len()];
         // Extents relative to the root's: areas of a scene of any size fit f32.
@@ -61,7 +64,7 @@ impl Plan {
                     let prims = tree.prims(i);
                     plan.classes[i] = class_of[prims[0] as usize];
                     plan.counts[i] = prims.len() as u32;
-                    costs[i] = [model.leaf(area, plan.counts[i]); WIDTH];
+                    costs[i] = [plan.leaf(i, area, model); WIDTH];
                 }
                 Some([l, r]) => {
                     plan.counts[i] = plan.counts[l] + plan.counts[r];
@@ -71,6 +74,12 @@ impl Plan {
             }
         }
         plan
+    }
+
+    /// Cost of node `i` as a leaf. One of several classes never becomes one.
+    fn leaf(&self, i: usize, area: f32, model: Cost) -> f32 {
+        let each = self.each.get(usize::from(self.classes[i])).copied().unwrap_or(PRIMITIVE);
+        model.leaf(area, self.counts[i], each)
     }
 
     fn inner(&mut self, i: usize, area: f32, model: Cost, left: &[f32; WIDTH], right: &[f32; WIDTH]) -> [f32; WIDTH] {
@@ -86,7 +95,7 @@ impl Plan {
         }
         let fits = self.counts[i] <= self.most && self.classes[i] != MIXED;
         let (best_forest, on_left) = forests[WIDTH - 1];
-        let (as_node, as_leaf) = (model.node(area) + best_forest, model.leaf(area, self.counts[i]));
+        let (as_node, as_leaf) = (model.node(area) + best_forest, self.leaf(i, area, model));
         let leaf = fits && as_leaf <= as_node;
         self.decisions[i][0] = if leaf { 0 } else { on_left };
         let mut costs = [if leaf { as_leaf } else { as_node }; WIDTH];

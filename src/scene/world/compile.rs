@@ -210,7 +210,10 @@ impl<S: Real> Primitives<S> {
     }
 
     fn build(mut self, settings: BuildSettings) -> Object<S> {
-        let (tree, leaves) = bvh::build(&self.boxes, &self.classes, settings);
+        // Blocks of triangles are tested at once, spheres one by one: each is as dear as a node.
+        let mut each = [bvh::PRIMITIVE; Class::ALL.len()];
+        each[Class::WorldSphere as usize] = 1.0;
+        let (tree, leaves) = bvh::build_by_cost(&self.boxes, &self.classes, &each, settings);
         let blocks = |class: Class| leaves.iter().filter(|leaf| leaf.class == class as u8).count();
         let mut object = Object {
             tree,
