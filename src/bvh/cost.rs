@@ -1,9 +1,9 @@
 //! What a tree costs: one model for all who decide on its shape.
 //!
-//! A node costs 1, a leaf 1 and a quarter per triangle or what its primitives are said to cost, both times the share of rays that meet their boxes, which is that of
-//! their surface (Goldsmith, Salmon, "Automatic Creation of Object Hierarchies for Ray Tracing", IEEE CG&A 7(5), 1987). What is
-//! there also costs if it is not met: it takes a place in the caches. So few rays' leaves are filled, as blocks have room for
-//! all their primitives, while what many rays meet, like the walls of a room, is kept apart.
+//! A node costs 1, a leaf 1 and a quarter per triangle, or what its primitives are said to cost, both times the share of rays that
+//! meet their boxes, which is that of their surface (Goldsmith, Salmon, "Automatic Creation of Object Hierarchies for Ray Tracing",
+//! IEEE CG&A 7(5), 1987). What is there also costs if it is not met: it takes a place in the caches. So few rays' leaves are filled,
+//! as blocks have room for all their primitives, while what many rays meet, like the walls of a room, is kept apart.
 
 /// Cost of a primitive in a leaf that is met: a triangle's, which is tested together with the others of its block.
 pub const PRIMITIVE: f32 = 0.25;
