@@ -6,7 +6,7 @@
 //! packet of one ray the intervals are points and this is that ray's own test.
 
 use super::node::{Node, WIDTH};
-use crate::lanes::{LaneMask, Lanes, Real, each, map3};
+use crate::lanes::{LaneMask, Lanes, Real, each, finite_rcp, map3};
 use crate::ray::Packet;
 use crate::ray::slab::{Interval, pad};
 
@@ -33,6 +33,19 @@ impl<S: Real> Bundle<S> {
     pub fn of<V: Lanes<Scalar = S>>(packet: &Packet<V>, lanes: u32, t_max: V) -> Self {
         let rcp = map3(packet.rcp, |r| r.range(lanes));
         let org = map3(packet.org, |o| o.range(lanes));
+        Self::new(org, rcp, packet.t_min.range(lanes).0, t_max.range(lanes).1, lanes)
+    }
+
+    /// Bounds of lines whose origins and directions lie between those of `org` and `dir`, least and largest, and whose
+    /// segments lie within `t_min..=reach`.
+    #[inline(always)]
+    pub fn spanning(org: [(S, S); 3], dir: [(S, S); 3], t_min: S, reach: S) -> Self {
+        // The reciprocal falls from the least to the largest number of one sign, also rounded; else the bundle is not uniform.
+        Self::new(org, map3(dir, |(low, high)| (finite_rcp(high), finite_rcp(low))), t_min, reach, u32::MAX)
+    }
+
+    #[inline(always)]
+    fn new(org: [(S, S); 3], rcp: [(S, S); 3], t_min: S, reach: S, lanes: u32) -> Self {
         let backward = map3(rcp, |(low, _)| low < S::ZERO);
         Self {
             uniform: rcp.iter().all(|(low, high)| (*low < S::ZERO) == (*high < S::ZERO)),
@@ -40,8 +53,8 @@ impl<S: Real> Bundle<S> {
             org_near: each(|a| if backward[a] { org[a].0 } else { org[a].1 }),
             org_far: each(|a| if backward[a] { org[a].1 } else { org[a].0 }),
             rcp,
-            t_min: packet.t_min.range(lanes).0,
-            reach: t_max.range(lanes).1,
+            t_min,
+            reach,
             lanes,
         }
     }

@@ -52,6 +52,11 @@ impl<S: Real> Solid<S> {
         self.tree.nodes[0].default
     }
 
+    /// Whether some of its leaves are made of triangles.
+    pub fn has_meshes(&self) -> bool {
+        !self.stores.meshes.is_empty()
+    }
+
     /// Number of leaves.
     pub fn leaf_count(&self) -> usize {
         self.leaves.len()

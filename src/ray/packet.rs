@@ -34,24 +34,41 @@ impl<V: Lanes> Packet<V> {
         let pick = |a: V, b: V, c: V| V::select(x, a, V::select(y, b, c));
         let scale = V::constant(1.0) / pick(dir[0], dir[1], dir[2]);
         Self {
+            dominant: [x.bits(), y.bits(), z.bits()],
+            shear: [-(pick(dir[1], dir[2], dir[0]) * scale), -(pick(dir[2], dir[0], dir[1]) * scale), scale],
+            ..Self::unsheared(org, dir, t_min)
+        }
+    }
+
+    /// The same without what only triangles ask for: no dominant axes, no shear.
+    #[inline(always)]
+    pub fn unsheared(org: Lanes3<V>, dir: Lanes3<V>, t_min: V) -> Self {
+        Self {
             org,
             dir,
             rcp: map3(dir, finite_rcp),
             t_min,
             t_floor: V::splat(V::Scalar::LOWEST),
-            dominant: [x.bits(), y.bits(), z.bits()],
-            shear: [-(pick(dir[1], dir[2], dir[0]) * scale), -(pick(dir[2], dir[0], dir[1]) * scale), scale],
+            dominant: [0; 3],
+            shear: [V::constant(0.0); 3],
         }
     }
 
     /// Rays `first..first + N` of a batch, their `t_max`, and the lanes that are live.
     #[inline(always)]
     pub fn load(rays: &Rays<V::Scalar>, first: usize) -> (Self, V, u32) {
+        let ([org, dir], [t_min, t_max], live) = Self::read(rays, first);
+        (Self::new(org, dir, t_min), t_max, live)
+    }
+
+    /// The same as they are: origins and directions, start and end of the segments, lanes that are live.
+    #[inline(always)]
+    pub fn read(rays: &Rays<V::Scalar>, first: usize) -> ([Lanes3<V>; 2], [V; 2], u32) {
         let load = |a: &Vec<V::Scalar>| V::load(&a[first..]);
         let org = [load(&rays.org[0]), load(&rays.org[1]), load(&rays.org[2])];
         let dir = [load(&rays.dir[0]), load(&rays.dir[1]), load(&rays.dir[2])];
         let (t_min, t_max) = (load(&rays.t_min), load(&rays.t_max));
-        (Self::new(org, dir, t_min), t_max, Self::live(org, dir, t_min.cmp_le(t_max)))
+        ([org, dir], [t_min, t_max], Self::live(org, dir, t_min.cmp_le(t_max)))
     }
 
     /// Lanes whose direction is largest along x, y, z.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::options::RenderOptions;
 use super::patch::Patch;
-use crate::camera::{Camera, Passes, PixelRect, Tiling, fill_passes, fill_pixels, morton_decode};
+use crate::camera::{Camera, Passes, PixelRect, Tiling, fill_passes, fill_pixels, morton_decode, morton_encode};
 use crate::lanes::Real;
 use crate::ray::Rays;
 use crate::shade::{Samples, Shader, Spot, Workspace};
@@ -50,6 +50,12 @@ impl Canvas<'_> {
         memory.pixels.clear();
         let places = (0..self.tiling.rays_per_tile()).map(morton_decode);
         memory.pixels.extend(places.map(|(dx, dy)| (x0 + dx, y0 + dy)));
+    }
+
+    /// Numbers of a tile's pixels, as they are listed, row by row.
+    pub fn by_rows(&self) -> impl Iterator<Item = usize> {
+        let edge = self.tiling.edge();
+        (0..edge).flat_map(move |y| (0..edge).map(move |x| morton_encode(x, y) as usize))
     }
 
     /// Traces the samples `numbers` of the pixels of a tile, which `memory` lists, as one batch into `memory.samples`.

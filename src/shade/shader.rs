@@ -185,8 +185,8 @@ impl<'a, S: Real> Shader<'a, S> {
     }
 
     /// What each ray of the primary batch `rays` sees, into `out` (made as long as the batch). Ray `i` is sample
-    /// `spots[i]`. Dead rays see nothing.
-    pub fn shade(&self, rays: &Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut Samples) {
+    /// `spots[i]`. Dead rays see nothing. What the batch is afterwards is unspecified.
+    pub fn shade(&self, rays: &mut Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut Samples) {
         let shows_hits = self.settings.first_hits || self.settings.cost || self.settings.integrator.shows_hits();
         out.open(rays.len(), shows_hits);
         work.clock.start(&work.rays);

@@ -22,9 +22,11 @@ pub trait Leaves<V: Lanes, const ANY: bool, const COUNT: bool> {
 }
 
 /// Leaves of an object's tree: blocks of primitives.
-struct ObjectLeaves<'a, S> {
-    object: &'a Object<S>,
-    inst: u32,
+pub struct ObjectLeaves<'a, S> {
+    /// The object.
+    pub object: &'a Object<S>,
+    /// Number of the instance.
+    pub inst: u32,
 }
 
 impl<V: Lanes, const ANY: bool, const COUNT: bool> Leaves<V, ANY, COUNT> for ObjectLeaves<'_, V::Scalar> {
@@ -35,7 +37,7 @@ impl<V: Lanes, const ANY: bool, const COUNT: bool> Leaves<V, ANY, COUNT> for Obj
 }
 
 /// Leaves of the upper tree: instances.
-struct TopLeaves<'a, S>(&'a World<S>);
+pub struct TopLeaves<'a, S>(pub &'a World<S>);
 
 impl<V: Lanes, const ANY: bool, const COUNT: bool> Leaves<V, ANY, COUNT> for TopLeaves<'_, V::Scalar> {
     fn visit(&self, packet: &Packet<V>, query: &mut Query<V, ANY, COUNT>, leaf: Child, lanes: u32) {
@@ -61,8 +63,9 @@ pub fn world<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
 }
 
+/// Traces a packet through an instance.
 #[inline(always)]
-fn instance<V: Lanes, const ANY: bool, const COUNT: bool>(
+pub fn instance<V: Lanes, const ANY: bool, const COUNT: bool>(
     world: &World<V::Scalar>,
     inst: u32,
     packet: &Packet<V>,

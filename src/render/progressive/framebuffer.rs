@@ -63,7 +63,7 @@ impl Framebuffer {
 
     /// Sets pixels; a later call changes their values (further samples).
     pub(super) fn paint(&mut self, patch: &Patch) {
-        for &place in patch.places() {
+        for place in patch.places() {
             self.left -= u64::from(!self.set[place]);
             self.set[place] = true;
         }
@@ -110,7 +110,7 @@ mod tests {
         let mut put = |frame: &mut Framebuffer, pixel, value| {
             let gray = Rgba { radiance: DVec3::splat(value), alpha: 1.0 };
             let samples = Samples { colors: vec![gray], hits: Vec::new() };
-            patch.fill(&channels, window, &[pixel], Finished::Samples(&samples));
+            patch.fill(&channels, window, &[pixel], 0..1, Finished::Samples(&samples));
             frame.paint(&patch);
         };
         assert_eq!((frame.shown(3, 5), frame.left()), (None, 81));

@@ -223,7 +223,8 @@ impl<'a, S: Real> Progressive<'a, S> {
             if self.canvas.options.spp > 1 {
                 self.keep_first(&memory.pixels, &memory.samples);
             }
-            memory.patch.fill(&self.channels, self.window, &memory.pixels, Finished::Samples(&memory.samples));
+            let (pixels, seen) = (&memory.pixels, Finished::Samples(&memory.samples));
+            memory.patch.fill(&self.channels, self.window, pixels, 0..pixels.len(), seen);
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
             self.told(watch, frame, lattice.part(batch), memory)
@@ -271,7 +272,8 @@ impl<'a, S: Real> Progressive<'a, S> {
                 tile.sums.add_passes(passes, &memory.samples);
                 tile.samples += passes.count();
             }
-            memory.patch.fill(&self.channels, self.window, &memory.pixels, Finished::Sums(&tile.sums, samples));
+            let (pixels, sums) = (&memory.pixels, Finished::Sums(&tile.sums, samples));
+            memory.patch.fill(&self.channels, self.window, pixels, self.canvas.by_rows(), sums);
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
             if samples == self.canvas.options.spp {

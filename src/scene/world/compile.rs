@@ -63,6 +63,7 @@ impl<S: Real> World<S> {
         let facets = assembly.objects.iter().zip(&runs).map(|(o, runs)| Facets::new(o, runs)).collect();
         let rounding = Rounding::of(&assembly.placements, &objects);
         let kinds = objects.iter().map(Object::kinds).fold(Kinds::default(), |a, b| Kinds {
+            triangles: a.triangles || b.triangles,
             shapes: a.shapes || b.shapes,
             others: a.others || b.others,
             sorting: a.sorting || b.sorting,

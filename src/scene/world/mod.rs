@@ -115,6 +115,8 @@ pub struct PlacedSolid<S> {
 /// What there is besides triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Kinds {
+    /// Triangles, those of solids among them: what asks for a packet's shear.
+    pub triangles: bool,
     /// Shapes with bounds.
     pub shapes: bool,
     /// Half-spaces or trees of solids.
@@ -307,6 +309,7 @@ impl<S: Real> Object<S> {
         let leaves: usize = self.solids.iter().map(|s| s.solid.leaf_count()).sum();
         let is_large = size_of::<S>() == size_of::<f32>() && self.tree.nodes.len() >= MANY_NODES;
         Kinds {
+            triangles: !self.triangles.is_empty() || self.solids.iter().any(|s| s.solid.has_meshes()),
             shapes,
             others: !self.unbounded.is_empty() || !self.solids.is_empty(),
             sorting: is_large || leaves > MANY_LEAVES * self.solids.len(),

@@ -39,28 +39,30 @@ pub(super) struct Level<S> {
 }
 
 impl<S: Real> Level<S> {
-    /// The primary rays `rays`; dead ones stay dead.
-    pub fn start(&mut self, rays: &Rays<S>) {
-        self.rays.open(rays.len());
+    /// The primary rays `rays`, which are lent; dead ones stay dead.
+    pub fn start(&mut self, rays: &mut Rays<S>) {
+        std::mem::swap(&mut self.rays, rays);
+        let rays = &mut self.rays;
         self.carry.clear();
         self.within.clear();
         let tolerance = S::Wide::constant(TOLERANCE);
         // Those of parallel projection all have one direction.
         let mut last = [[S::Wide::constant(0.0); 3]; 2];
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
-            let (org, dir) = (vector(&rays.org, first), vector(&rays.dir, first));
+            let dir = vector(&rays.dir, first);
             let [x, y, z] = each(|axis| dir[axis].cmp_eq(last[0][axis]));
             if (x & y & z).bits() != S::Wide::ALL {
                 last = [dir, space::normalize(dir)];
             }
             let dir = last[1];
-            for axis in 0..3 {
-                org[axis].store(&mut self.rays.org[axis][first..]);
-                dir[axis].store(&mut self.rays.dir[axis][first..]);
-            }
-            tolerance.fast_max(S::Wide::load(&rays.t_min[first..])).store(&mut self.rays.t_min[first..]);
-            S::Wide::load(&rays.t_max[first..]).store(&mut self.rays.t_max[first..]);
+            (0..3).for_each(|axis| dir[axis].store(&mut rays.dir[axis][first..]));
+            tolerance.fast_max(S::Wide::load(&rays.t_min[first..])).store(&mut rays.t_min[first..]);
         }
+    }
+
+    /// Ends what [`Self::start`] began: the batch goes back.
+    pub fn give_back(&mut self, rays: &mut Rays<S>) {
+        std::mem::swap(&mut self.rays, rays);
     }
 
     /// The paths `paths`.

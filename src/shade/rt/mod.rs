@@ -138,7 +138,7 @@ impl Rt {
 
 impl<S: Real> Shader<'_, S> {
     /// What each primary ray of `rays` sees in `rt`'s lighting model.
-    pub(super) fn rt(&self, rt: &Rt, rays: &Rays<S>, work: &mut Workspace<S>, out: &mut Samples) {
+    pub(super) fn rt(&self, rt: &Rt, rays: &mut Rays<S>, work: &mut Workspace<S>, out: &mut Samples) {
         let mut memory = std::mem::take(&mut work.rt);
         memory.level.start(rays);
         let mut next = Vec::new();
@@ -157,11 +157,14 @@ impl<S: Real> Shader<'_, S> {
             self.rt_sort(rt, &mut memory, &work.hits, &mut next, out);
             self.rt_lost(rt, &mut memory, work, out);
             self.rt_light(rt, &mut memory, &mut next, work, out);
+            if is_primary {
+                memory.level.give_back(rays);
+            }
             memory.level.open(&next);
             next.clear();
             is_primary = false;
         }
-        for (first, &[live, hit]) in (0..rays.len()).step_by(S::Wide::N).zip(&memory.first) {
+        for (first, &[live, hit]) in (0..out.colors.len()).step_by(S::Wide::N).zip(&memory.first) {
             lanes_of(live).for_each(|lane| out.colors[first + lane].alpha = 1.0);
             lanes_of(hit).for_each(|lane| not_the_background(&mut out.colors[first + lane]));
         }

@@ -11,6 +11,7 @@
 //! Ray Stream Tracing", 2009; Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray tracing kernels for modern CPU
 //! architectures", 2015.
 
+mod block;
 mod bounds;
 mod chunk;
 mod leaf;
@@ -26,6 +27,7 @@ use crate::lanes::words::{prefetch, transpose_bits};
 use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
+use block::Block;
 use chunk::{Best, Chunk, RAYS};
 
 /// Rays that are sorted together.
@@ -56,6 +58,7 @@ pub struct Memory<S> {
     best: Best<S>,
     waiting: walk::Pile<S>,
     closer: leaf::Closer<S>,
+    block: Block<S>,
 }
 
 impl<S: Real> Default for Memory<S> {
@@ -68,6 +71,7 @@ impl<S: Real> Default for Memory<S> {
             best: Best::default(),
             waiting: walk::Pile::default(),
             closer: leaf::Closer::default(),
+            block: Block::default(),
         }
     }
 }
@@ -124,19 +128,42 @@ impl<S: Real> Job<'_, S> {
         starts: impl Iterator<Item = usize>,
     ) {
         self.memory.waiting.reserve(self.world.stack_bound());
-        let of_shapes = self.world.is_of_shapes();
+        if self.world.is_of_shapes() {
+            self.blocks::<V, ANY, COUNT>(starts);
+        } else {
+            let mut sorted = 0;
+            for at in starts {
+                sorted += self.among_triangles::<V, ANY, COUNT>(at);
+                if sorted + V::N > SOURCE {
+                    self.sorted::<V, ANY, COUNT>();
+                    sorted = 0;
+                }
+            }
+        }
+        self.sorted::<V, ANY, COUNT>();
+    }
+
+    /// Traces vectors of rays among shapes, some as blocks, and sorts the others.
+    fn blocks<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        mut starts: impl Iterator<Item = usize>,
+    ) {
+        self.memory.block.start();
         let mut sorted = 0;
-        for at in starts {
-            sorted += match of_shapes {
-                true => self.among_shapes::<V, ANY, COUNT>(at),
-                false => self.among_triangles::<V, ANY, COUNT>(at),
-            };
-            if sorted + V::N > SOURCE {
+        loop {
+            let (mut some, mut count) = ([0; block::SIZES[0]], 0);
+            for (to, at) in some.iter_mut().zip(&mut starts) {
+                (*to, count) = (at, count + 1);
+            }
+            if count == 0 {
+                return;
+            }
+            sorted += self.block::<V, ANY, COUNT>(&some[..count], 0);
+            if sorted + V::N * block::SIZES[0] > SOURCE {
                 self.sorted::<V, ANY, COUNT>();
                 sorted = 0;
             }
         }
-        self.sorted::<V, ANY, COUNT>();
     }
 
     /// Traces a vector of rays as a packet, or, if they are of more than two octants and the world repays it, sorts its live
@@ -231,7 +258,7 @@ impl<S: Real> Job<'_, S> {
     /// Traces what was sorted, chunk by chunk.
     #[inline(always)]
     fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
-        let Memory { bins, ids, chunk, local, best, waiting, closer } = &mut *self.memory;
+        let Memory { bins, ids, chunk, local, best, waiting, closer, .. } = &mut *self.memory;
         for octant in 0..OCTANTS {
             ids.clear();
             bins[octant..].iter_mut().step_by(OCTANTS).for_each(|alike| ids.append(alike));

@@ -1,0 +1,263 @@
+//! Blocks of neighbouring rays among shapes: a block goes down the tree once, as a whole, which lists the leaves that some of
+//! its rays may meet, nearest first; then its vectors are tested against the list, without a tree.
+//!
+//! Every ray meets each leaf that it would meet by itself, so the hits are those of packets, bit by bit. Rays of a parallel
+//! camera share what follows from their direction, too.
+//!
+//! Sources: Reshetov, Soupikov, Hurley, "Multi-Level Ray Tracing Algorithm", 2005 (a beam of rays finds what all of them begin
+//! with); Boulos, Wald, Shirley, "Geometric and Arithmetic Culling Methods for Entire Ray Packets", 2006.
+
+use super::Job;
+use crate::bvh::{Bundle, Child, Tree, WIDTH};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each, map3};
+use crate::ray::slab::Interval;
+use crate::ray::{HitPacket, Packet, Rays};
+use crate::trace::query::Query;
+use crate::trace::traverse::{self, Leaves, ObjectLeaves, TopLeaves};
+use crate::trace::leaf;
+
+/// Vectors of rays of a block, and of its parts where it meets too much.
+pub const SIZES: [usize; 2] = [16, 4];
+
+/// Leaves that a block may meet.
+const MOST: usize = 32;
+
+/// Blocks of a size that are left alone after one that met too much, and at most, twice as many each time.
+const PATIENCE: u32 = 16;
+
+/// A leaf that some rays may meet.
+#[derive(Clone, Copy, Debug)]
+struct Listed<S> {
+    /// Nobody meets it before.
+    near: S,
+    leaf: Child,
+    /// Its box: a node and a slot.
+    node: u32,
+    slot: usize,
+}
+
+/// Working memory.
+#[derive(Clone, Debug)]
+pub struct Block<S> {
+    list: Vec<Listed<S>>,
+    waiting: Vec<u32>,
+    /// For each size: blocks to be left alone, and how many it will be after the next that meets too much.
+    patience: [(u32, u32); SIZES.len()],
+}
+
+impl<S> Default for Block<S> {
+    fn default() -> Self {
+        Self { list: Vec::new(), waiting: Vec::new(), patience: [(0, 1); SIZES.len()] }
+    }
+}
+
+impl<S> Block<S> {
+    /// Forgets what earlier calls found.
+    pub fn start(&mut self) {
+        self.patience = [(0, 1); SIZES.len()];
+    }
+
+    /// Whether to try a block of size `size`.
+    fn is_worth_trying(&mut self, size: usize) -> bool {
+        let (rest, _) = &mut self.patience[size];
+        let try_it = *rest == 0;
+        *rest = rest.saturating_sub(1);
+        try_it
+    }
+
+    /// Remembers how it went.
+    fn remember(&mut self, size: usize, went_well: bool) {
+        let (rest, next) = &mut self.patience[size];
+        (*rest, *next) = if went_well { (0, 1) } else { (*next, (*next * 2).min(PATIENCE)) };
+    }
+}
+
+/// Least and largest numbers of the rays of a block.
+struct Bounds<V> {
+    org: Lanes3<(V, V)>,
+    dir: Lanes3<(V, V)>,
+    /// Earliest start and latest end.
+    t: (V, V),
+    /// Lanes that are live in some vector.
+    live: u32,
+}
+
+impl<V: Lanes> Bounds<V> {
+    /// Of the live rays of the vectors that start at `starts`.
+    #[inline(always)]
+    fn of(rays: &Rays<V::Scalar>, starts: &[usize]) -> Self {
+        let none = (V::splat(V::Scalar::INFINITY), V::splat(V::Scalar::LOWEST));
+        let mut bounds = Self { org: [none; 3], dir: [none; 3], t: none, live: 0 };
+        for &at in starts {
+            let ([org, dir], [t_min, t_max], live) = Packet::<V>::read(rays, at);
+            bounds.live |= live;
+            if live == V::ALL {
+                let wider = |(low, high): (V, V), x: V| (x.fast_min(low), x.fast_max(high));
+                bounds.org = each(|axis| wider(bounds.org[axis], org[axis]));
+                bounds.dir = each(|axis| wider(bounds.dir[axis], dir[axis]));
+                bounds.t = (t_min.fast_min(bounds.t.0), t_max.fast_max(bounds.t.1));
+            } else if live != 0 {
+                let live = V::Mask::from_bits(live);
+                let low = |low: V, x: V| V::select(live, x, none.0).fast_min(low);
+                let high = |high: V, x: V| V::select(live, x, none.1).fast_max(high);
+                let wider = |(least, most): (V, V), x: V| (low(least, x), high(most, x));
+                bounds.org = each(|axis| wider(bounds.org[axis], org[axis]));
+                bounds.dir = each(|axis| wider(bounds.dir[axis], dir[axis]));
+                bounds.t = (low(bounds.t.0, t_min), high(bounds.t.1, t_max));
+            }
+        }
+        bounds
+    }
+
+    /// As one bundle of lines, and whether they all have one direction.
+    #[inline(always)]
+    fn bundle(&self) -> (Bundle<V::Scalar>, bool) {
+        let range = |(low, high): (V, V)| (low.range(self.live).0, high.range(self.live).1);
+        let dir = map3(self.dir, range);
+        let (start, end) = range(self.t);
+        let shared = dir.iter().all(|(low, high)| low == high);
+        (Bundle::spanning(map3(self.org, range), dir, start, end), shared)
+    }
+}
+
+impl<S: Real> Job<'_, S> {
+    /// Traces the vectors of rays that start at `starts` as a block of size `size`, as smaller ones, or each by itself. Returns
+    /// how many rays were sorted.
+    pub fn block<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        starts: &[usize],
+        size: usize,
+    ) -> usize {
+        if starts.len() > 1 && self.memory.block.is_worth_trying(size) {
+            let done = self.whole::<V, ANY, COUNT>(starts);
+            self.memory.block.remember(size, done);
+            if done {
+                return 0;
+            }
+        }
+        match SIZES.get(size + 1) {
+            Some(&smaller) => starts.chunks(smaller).map(|part| self.block::<V, ANY, COUNT>(part, size + 1)).sum(),
+            None => starts.iter().map(|&at| self.among_shapes::<V, ANY, COUNT>(at)).sum(),
+        }
+    }
+
+    /// Traces vectors of rays by one list of leaves; false if that is too long, or if they look into several octants.
+    fn whole<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
+        let bounds = Bounds::<V>::of(self.rays, starts);
+        if bounds.live == 0 {
+            let nothing = HitPacket::<V>::new(V::constant(0.0));
+            starts.iter().for_each(|&at| self.output.put(at, &nothing, 0));
+            return true;
+        }
+        let (bundle, shared) = bounds.bundle();
+        let world = self.world;
+        let single = world.is_single_object();
+        let tree = if single { &world.first_object().tree } else { &world.top };
+        if !bundle.is_uniform() || !self.list::<V, ANY, COUNT>(tree, &bundle) {
+            return false;
+        }
+        if single {
+            let leaves = ObjectLeaves { object: world.first_object(), inst: 0 };
+            self.vectors::<V, _, ANY, COUNT>(tree, &leaves, starts, shared, |packet, query, lanes| {
+                leaf::unbounded(leaves.object, 0, packet, query, lanes);
+            });
+        } else {
+            self.vectors::<V, _, ANY, COUNT>(tree, &TopLeaves(world), starts, shared, |packet, query, lanes| {
+                for &inst in &world.unbounded_instances {
+                    traverse::instance(world, inst, packet, query, lanes);
+                }
+            });
+        }
+        true
+    }
+
+    /// Lists the leaves of `tree` that `bundle` may meet, nearest first; false if there are too many.
+    fn list<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        tree: &Tree<S>,
+        bundle: &Bundle<S>,
+    ) -> bool {
+        let Block { list, waiting, .. } = &mut self.memory.block;
+        list.clear();
+        waiting.clear();
+        if !tree.nodes.is_empty() {
+            waiting.push(Child::ROOT.index);
+        }
+        let mut near = [S::ZERO; WIDTH];
+        while let Some(index) = waiting.pop() {
+            let node = &tree.nodes[index as usize];
+            if COUNT {
+                self.counters.nodes += 1;
+                self.counters.box_lanes += WIDTH as u64;
+            }
+            let mut hit = bundle.children::<V>(node, &mut near) & ((1 << node.used) - 1);
+            while hit != 0 {
+                let slot = hit.trailing_zeros() as usize & (WIDTH - 1);
+                hit &= hit - 1;
+                let leaf = node.child(slot);
+                if !leaf.is_leaf() {
+                    waiting.push(leaf.index);
+                    continue;
+                }
+                if list.len() == MOST {
+                    return false;
+                }
+                list.push(Listed { near: near[slot], leaf, node: index, slot });
+            }
+        }
+        if !ANY {
+            list.sort_unstable_by(|a, b| a.near.partial_cmp(&b.near).unwrap_or(std::cmp::Ordering::Equal));
+        }
+        true
+    }
+
+    /// Tests vectors of rays, `shared` if they have one direction, against the listed leaves of `tree`; `first` has what no
+    /// tree holds.
+    #[inline(always)]
+    fn vectors<V: Lanes<Scalar = S>, L: Leaves<V, ANY, COUNT>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        tree: &Tree<S>,
+        leaves: &L,
+        starts: &[usize],
+        shared: bool,
+        first: impl Fn(&Packet<V>, &mut Query<V, ANY, COUNT>, u32),
+    ) {
+        let of_triangles = self.world.kinds.triangles;
+        let mut last: Option<Packet<V>> = None;
+        for &at in starts {
+            let ([org, dir], [t_min, t_max], live) = Packet::<V>::read(self.rays, at);
+            if COUNT {
+                self.counters.rays += u64::from(live.count_ones());
+            }
+            // What the shear of triangles has for a direction of -0 is not what it has for 0.
+            let packet = match last {
+                Some(last) if shared && live == V::ALL && !of_triangles => Packet { org, dir, t_min, ..last },
+                _ if of_triangles => Packet::new(org, dir, t_min),
+                _ => Packet::unsheared(org, dir, t_min),
+            };
+            last = (live == V::ALL).then_some(packet);
+            let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
+            if live != 0 {
+                first(&packet, &mut query, live);
+                for listed in &self.memory.block.list {
+                    let mut lanes = query.wanted(live, V::splat(listed.near));
+                    // The others begin behind it.
+                    if lanes == 0 {
+                        break;
+                    }
+                    if listed.leaf.count > 1 {
+                        let bounds = tree.nodes[listed.node as usize].child_bounds(listed.slot);
+                        let interval = Interval::of(&packet, bounds.lo, bounds.hi);
+                        query.count_box();
+                        lanes &= interval.meets(packet.t_min, query.hit.t).bits();
+                    }
+                    if lanes != 0 {
+                        leaves.visit(&packet, &mut query, listed.leaf, lanes);
+                    }
+                }
+            }
+            let (hit, done) = (query.hit, query.done);
+            self.output.put(at, &hit, done);
+        }
+    }
+}
