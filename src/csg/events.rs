@@ -39,17 +39,10 @@ impl<S: Real> Events<S> {
     /// go to infinity: there the leaf makes no difference, and a boundary must not count where it is not.
     #[inline(always)]
     pub fn push_span<V: Lanes<Scalar = S>>(&mut self, leaf: u32, lanes: u32, span: &Span<V>, within: &Interval<V>) {
-        let (before, after) = (-V::splat(S::INFINITY), V::splat(S::INFINITY));
-        let settled = |t: V| {
-            let t = V::select(t.cmp_lt(within.near), before, t);
-            V::select(within.far.cmp_lt(t), after, t)
-        };
-        let (t_in, t_out) = (settled(span.t_in), settled(span.t_out));
-        // Both or none; NaN is none.
-        let both = span.hit & t_in.cmp_le(t_out) & V::Mask::from_bits(lanes);
-        if both.any() {
-            self.push(leaf, both, t_in, span.face_in);
-            self.push(leaf, both, t_out, span.face_out);
+        let Span { hit, t_in, t_out, face_in, face_out } = settled(span, lanes, within);
+        if hit.any() {
+            self.push(leaf, hit, t_in, face_in);
+            self.push(leaf, hit, t_out, face_out);
         }
     }
 
@@ -57,4 +50,18 @@ impl<S: Real> Events<S> {
     pub(super) fn time<V: Lanes<Scalar = S>>(&self, event: usize) -> V {
         V::load(&self.t[event * MAX_LANES..])
     }
+}
+
+/// `span` in the lanes of `lanes`, with boundaries outside of the leaf's box at infinity.
+#[inline(always)]
+pub(super) fn settled<V: Lanes>(span: &Span<V>, lanes: u32, within: &Interval<V>) -> Span<V> {
+    let infinity = V::splat(V::Scalar::INFINITY);
+    let settle = |t: V| {
+        let t = V::select(t.cmp_lt(within.near), -infinity, t);
+        V::select(within.far.cmp_lt(t), infinity, t)
+    };
+    let (t_in, t_out) = (settle(span.t_in), settle(span.t_out));
+    // Both or none; NaN is none.
+    let hit = span.hit & t_in.cmp_le(t_out) & V::Mask::from_bits(lanes);
+    Span { hit, t_in, t_out, ..*span }
 }

@@ -85,6 +85,18 @@ pub(super) enum Kind {
     Mesh(u32),
 }
 
+impl Kind {
+    /// Whether lines pass through it at most once; [`Leaf::span`] knows where.
+    #[inline(always)]
+    pub(super) fn is_span(self) -> bool {
+        match self {
+            Self::Sphere | Self::Ball | Self::HalfSpace | Self::Cuboid | Self::Cylinder | Self::Cone => true,
+            Self::Planes { .. } => true,
+            Self::Round | Self::Trough | Self::Torus | Self::EllipticTorus | Self::Taper | Self::Mesh(_) => false,
+        }
+    }
+}
+
 /// A compiled leaf.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leaf<S> {
@@ -175,33 +187,45 @@ impl<S: Real> Leaf<S> {
             mesh.boundaries(packet, within, eps, (slot, lanes), crossings, events);
             return;
         }
-        let local = || (self.to_local.points(packet.org), self.to_local.vectors(packet.dir));
-        let p @ [p0, p1, p2, _] = self.params;
         // One call for all with a single span, apart from the others': it is large, and the compiler left it out of line.
-        let span = match self.kind {
+        if let Some(span) = self.span(packet, stores) {
+            return events.push_span(slot, lanes, &span, within);
+        }
+        let (o, d) = self.local(packet);
+        let [p0, p1, p2, _] = self.params;
+        let push = |span| events.push_span(slot, lanes, &span, within);
+        match self.kind {
+            Kind::Round => shape::quadric::round(o, d, [p0, p1, p2], push),
+            Kind::Trough => shape::quadric::trough(o, d, [p0, p1, p2], push),
+            Kind::Torus => shape::torus(o, d, p0, push),
+            Kind::EllipticTorus => shape::elliptic_torus(o, d, [p0, p1], push),
+            _ => shape::taper(o, d, [p0, p1], push),
+        }
+    }
+
+    /// Where lines are inside, if this leaf is of a kind that lines pass through at most once.
+    #[inline(always)]
+    pub fn span<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>, stores: &Stores<S>) -> Option<Span<V>> {
+        let p @ [p0, ..] = self.params;
+        Some(match self.kind {
             Kind::Planes { first, count } => {
                 let planes = &stores.planes[first as usize..][..count as usize];
                 shape::planes_span(packet.org, packet.dir, planes)
             }
             Kind::Ball => WorldSphere::span(packet.org, packet.dir, &p),
-            Kind::Sphere => of::<Sphere, V>(local(), p0),
-            Kind::HalfSpace => of::<HalfSpace, V>(local(), p0),
-            Kind::Cuboid => of::<Cuboid, V>(local(), p0),
-            Kind::Cylinder => of::<Cylinder, V>(local(), p0),
-            Kind::Cone => of::<Cone, V>(local(), p0),
-            kind => {
-                let (o, d) = local();
-                let push = |span| events.push_span(slot, lanes, &span, within);
-                return match kind {
-                    Kind::Round => shape::quadric::round(o, d, [p0, p1, p2], push),
-                    Kind::Trough => shape::quadric::trough(o, d, [p0, p1, p2], push),
-                    Kind::Torus => shape::torus(o, d, p0, push),
-                    Kind::EllipticTorus => shape::elliptic_torus(o, d, [p0, p1], push),
-                    _ => shape::taper(o, d, [p0, p1], push),
-                };
-            }
-        };
-        events.push_span(slot, lanes, &span, within);
+            Kind::Sphere => of::<Sphere, V>(self.local(packet), p0),
+            Kind::HalfSpace => of::<HalfSpace, V>(self.local(packet), p0),
+            Kind::Cuboid => of::<Cuboid, V>(self.local(packet), p0),
+            Kind::Cylinder => of::<Cylinder, V>(self.local(packet), p0),
+            Kind::Cone => of::<Cone, V>(self.local(packet), p0),
+            _ => return None,
+        })
+    }
+
+    /// Origins and directions in its local space.
+    #[inline(always)]
+    fn local<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>) -> (Lanes3<V>, Lanes3<V>) {
+        (self.to_local.points(packet.org), self.to_local.vectors(packet.dir))
     }
 }
 

@@ -1,6 +1,6 @@
 //! A compiled solid: leaves, operations, bounds, and a tree over the leaves' boxes where there are many.
 
-use super::events::Events;
+use super::events::{Events, settled};
 use super::leaf::{Leaf, Stores};
 use super::mesh::Crossings;
 use super::prune::Met;
@@ -10,6 +10,7 @@ use crate::lanes::{LaneMask, Lanes, Real};
 use crate::math::Aabb;
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
+use crate::shape::Span;
 
 /// Boundaries closer than this many roundings of the coordinates are one: 16 half ulps.
 const ROUNDINGS: f64 = 16.0;
@@ -171,6 +172,27 @@ impl<S: Real> Solid<S> {
         }
     }
 
+    /// Whether it is its only leaf and lines pass through that at most once.
+    #[inline(always)]
+    pub fn is_span(&self) -> bool {
+        self.is_sole && self.leaves[0].kind.is_span()
+    }
+
+    /// Where lines `lanes`, which meet its box in `interval`, are inside of a solid that [`Self::is_span`]; lines that only touch
+    /// it are not, as for the sweep. `None` for other solids.
+    #[inline(always)]
+    pub fn span<V: Lanes<Scalar = S>>(
+        &self,
+        packet: &Packet<V>,
+        lanes: u32,
+        interval: &Interval<V>,
+    ) -> Option<Span<V>> {
+        let span = self.leaves[0].span(packet, &self.stores)?;
+        let eps = self.tolerance(packet);
+        let span = settled(&span, lanes, &widened(interval, eps));
+        Some(Span { hit: span.hit & (span.t_in + eps).cmp_lt(span.t_out), ..span })
+    }
+
     /// Adds the boundaries of a leaf whose box the lines meet in `interval`. `eps`: the tolerance.
     #[inline(never)]
     pub(super) fn boundaries_within<V: Lanes<Scalar = S>>(
@@ -182,9 +204,15 @@ impl<S: Real> Solid<S> {
         events: &mut Events<S>,
         crossings: &mut Crossings,
     ) {
-        let slack = eps + eps;
-        let within = Interval { near: interval.near - slack, far: interval.far + slack };
+        let within = widened(interval, eps);
         let leaf = &self.leaves[met.leaf as usize];
         leaf.boundaries(packet, &within, (&self.stores, eps), (slot, met.lanes), (events, crossings));
     }
+}
+
+/// Where boundaries of a leaf may lie whose box is met in `interval`.
+#[inline(always)]
+fn widened<V: Lanes>(interval: &Interval<V>, eps: V) -> Interval<V> {
+    let slack = eps + eps;
+    Interval { near: interval.near - slack, far: interval.far + slack }
 }

@@ -130,9 +130,12 @@ fn sole<V: Lanes>(
     events.clear();
     solid.boundaries_within(packet, &met[0], 0, (interval, eps), events, crossings);
     let count = events.count;
+    if count == 0 {
+        return Effort { met: 1, kept: 1, ..Effort::default() };
+    }
     if count != 2 {
         pruner.prune(&solid.tree, met, program);
-        let steps = if count == 0 { 0 } else { walk(scratch, lanes, limit, eps, found) };
+        let steps = walk(scratch, lanes, limit, eps, found);
         return Effort { met: 1, kept: 1, events: count, steps };
     }
     let (t_in, t_out) = (events.time::<V>(0), events.time::<V>(1));

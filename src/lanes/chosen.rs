@@ -49,7 +49,11 @@ pub fn merge_lists(mask: <f32x16 as Lanes>::Mask, new: [u32; MAX_LANES], old: [u
 #[inline(always)]
 pub fn spill<V: Lanes>(vectors: Lanes3<V>) -> [[V::Scalar; MAX_LANES]; 3] {
     let mut columns = [[V::Scalar::ZERO; MAX_LANES]; 3];
-    columns.iter_mut().zip(vectors).for_each(|(column, x)| x.store(column));
+    // Written out: an iterator over the vectors puts them into memory first, and waits for that.
+    let [x, y, z] = vectors;
+    x.store(&mut columns[0]);
+    y.store(&mut columns[1]);
+    z.store(&mut columns[2]);
     columns
 }
 

@@ -149,10 +149,16 @@ impl Places {
                 let (mut of_column, mut of_row) = ([0.0; EDGE], [0.0; EDGE]);
                 of_column.iter_mut().zip(columns).for_each(|(to, a)| *to = first(*a));
                 of_row.iter_mut().zip(rows).for_each(|(to, b)| *to = second(*b));
-                for (block, to) in to.chunks_exact_mut(16).enumerate() {
+                let (blocks, _) = to.as_chunks_mut::<16>();
+                for (block, to) in blocks.iter_mut().enumerate() {
                     let [x, y] = corner(block);
                     let (a, b) = (spread(&of_column, x, 0), spread(&of_row, y, 1));
-                    to.iter_mut().zip(a.iter().zip(&b)).for_each(|(to, (a, b))| *to = S::from_f64(value(*a, *b)));
+                    // Block by block: made in place, the compiler scatters the numbers of several blocks.
+                    let mut of_block = [S::ZERO; 16];
+                    for i in 0..16 {
+                        of_block[i] = S::from_f64(value(a[i], b[i]));
+                    }
+                    *to = of_block;
                 }
             }
             Self::Each([a, b]) => {

@@ -55,7 +55,8 @@ impl Canvas<'_> {
     /// Numbers of a tile's pixels, as they are listed, row by row.
     pub fn by_rows(&self) -> impl Iterator<Item = usize> {
         let edge = self.tiling.edge();
-        (0..edge).flat_map(move |y| (0..edge).map(move |x| morton_encode(x, y) as usize))
+        let row = move |y| (0..edge).map(move |x| morton_encode(x, 0) | y);
+        (0..edge).map(|y| morton_encode(0, y)).flat_map(row).map(|number| number as usize)
     }
 
     /// Traces the samples `numbers` of the pixels of a tile, which `memory` lists, as one batch into `memory.samples`.

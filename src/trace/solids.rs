@@ -1,14 +1,14 @@
 //! Trees of solids against a packet: the nearest boundary at or after the segment's start.
 
 use super::query::Query;
-use crate::csg::{self, Boundary, Depth, Effort};
+use crate::csg::{self, Depth, Effort};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::slab::Interval;
 use crate::ray::{Candidate, Packet};
 use crate::scene::world::PlacedSolid;
 
 /// Tests one solid.
-#[inline(never)]
+#[inline(always)]
 pub fn trace<V: Lanes, const ANY: bool, const COUNT: bool>(
     placed: &PlacedSolid<V::Scalar>,
     inst: u32,
@@ -16,12 +16,37 @@ pub fn trace<V: Lanes, const ANY: bool, const COUNT: bool>(
     query: &mut Query<V, ANY, COUNT>,
     lanes: u32,
 ) {
+    // Two calls: the registers of one would be those of both.
+    match placed.solid.is_span() {
+        true => span(placed, inst, packet, query, lanes),
+        false => sweep(placed, inst, packet, query, lanes),
+    }
+}
+
+/// Where the lines meet the solid's box, and the lanes that look for something there.
+#[inline(always)]
+fn enter<V: Lanes, const ANY: bool, const COUNT: bool>(
+    placed: &PlacedSolid<V::Scalar>,
+    packet: &Packet<V>,
+    query: &Query<V, ANY, COUNT>,
+    lanes: u32,
+) -> (Interval<V>, u32) {
     let bounds = &placed.solid.bounds;
     let interval = Interval::of(packet, bounds.lo, bounds.hi);
-    let mut wanted = interval.meets(packet.t_min, query.hit.t).bits() & lanes;
-    if ANY {
-        wanted &= !query.done;
-    }
+    let wanted = interval.meets(packet.t_min, query.hit.t).bits() & lanes;
+    (interval, if ANY { wanted & !query.done } else { wanted })
+}
+
+/// Tests a solid of any number of leaves.
+#[inline(never)]
+fn sweep<V: Lanes, const ANY: bool, const COUNT: bool>(
+    placed: &PlacedSolid<V::Scalar>,
+    inst: u32,
+    packet: &Packet<V>,
+    query: &mut Query<V, ANY, COUNT>,
+    lanes: u32,
+) {
+    let (interval, wanted) = enter(placed, packet, query, lanes);
     if wanted == 0 {
         return;
     }
@@ -30,7 +55,7 @@ pub fn trace<V: Lanes, const ANY: bool, const COUNT: bool>(
     let limit = query.hit.t;
     let effort =
         csg::sweep(&placed.solid, packet, (wanted, &interval), limit, Depth::FrontFirst, &mut scratch, |boundary| {
-            let found = candidate(packet, &interval, boundary);
+            let found = candidate(packet, &interval, boundary.t, boundary.face, boundary.turned);
             let prim = placed.first_prim + placed.solid.number(boundary.leaf);
             query.take(boundary.lanes, &found, prim, inst);
             // What lies beyond the end of a segment ends the lane too.
@@ -42,17 +67,51 @@ pub fn trace<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
 }
 
+/// Tests a solid that lines pass through at most once. Takes in where they enter, or, if that does not count, where they leave:
+/// the same as a sweep over both.
+#[inline(never)]
+fn span<V: Lanes, const ANY: bool, const COUNT: bool>(
+    placed: &PlacedSolid<V::Scalar>,
+    inst: u32,
+    packet: &Packet<V>,
+    query: &mut Query<V, ANY, COUNT>,
+    lanes: u32,
+) {
+    let (interval, wanted) = enter(placed, packet, query, lanes);
+    if wanted == 0 {
+        return;
+    }
+    let Some(span) = placed.solid.span(packet, wanted, &interval) else { return };
+    let boundary = |t: V, face: V| {
+        let found = candidate(packet, &interval, t, face, 0);
+        Candidate { hit: found.hit & t.cmp_le(query.hit.t), ..found }
+    };
+    let (enters, leaves) = (boundary(span.t_in, span.face_in), boundary(span.t_out, span.face_out));
+    let nearest = |of_enters: V, of_leaves: V| V::select(enters.hit, of_enters, of_leaves);
+    let found = Candidate {
+        hit: span.hit & (enters.hit | leaves.hit),
+        t: nearest(enters.t, leaves.t),
+        u: nearest(enters.u, leaves.u),
+        v: enters.v,
+    };
+    query.take(wanted, &found, placed.first_prim + placed.solid.number(0), inst);
+    if COUNT {
+        let (events, steps) = if span.hit.any() { (2, 2) } else { (0, 0) };
+        count(query, wanted, &Effort { met: 1, kept: 1, events, steps });
+    }
+}
+
 /// A boundary as a hit, made consistent with the solid's box (see [`crate::ray::slab`]).
 #[inline(always)]
-fn candidate<V: Lanes>(packet: &Packet<V>, interval: &Interval<V>, boundary: &Boundary<V>) -> Candidate<V> {
-    let t = packet.t_floor.fast_max(interval.clamp(boundary.t));
+fn candidate<V: Lanes>(packet: &Packet<V>, interval: &Interval<V>, at: V, face: V, turned: u32) -> Candidate<V> {
+    let t = packet.t_floor.fast_max(interval.clamp(at));
     // Ends at infinity are no boundaries.
-    let finite = boundary.t.abs().cmp_le(V::splat(V::Scalar::MAX));
-    let turned = V::Mask::from_bits(boundary.turned);
+    let finite = at.abs().cmp_le(V::splat(V::Scalar::MAX));
+    let turned = V::Mask::from_bits(turned);
     Candidate {
         hit: packet.t_min.cmp_le(t) & finite,
         t,
-        u: boundary.face,
+        u: face,
         v: V::select(turned, V::constant(1.0), V::constant(0.0)),
     }
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{Carry, Path, TOLERANCE};
 use crate::lanes::chosen::{at, lanes_of, spill};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, map3, space};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3, space};
 use crate::ray::{Hits, Rays};
 use crate::scene::world::World;
 use crate::shade::sample::Samples;
@@ -103,12 +103,18 @@ impl<S: Real> Level<S> {
     #[inline]
     pub fn show(&self, first: usize, lanes: u32, color: Lanes3<S::Wide>, out: &mut Samples) {
         let color = spill(color);
-        for lane in lanes_of(lanes) {
-            let color = DVec3::from(map3(at(&color, lane), S::to_f64));
-            match self.carry.get(first + lane) {
-                None => out.colors[first + lane].radiance += color,
-                Some(carry) => out.colors[carry.pixel as usize].radiance += carry.throughput * color,
+        let color = |lane: usize| DVec3::from(map3(at(&color, lane % MAX_LANES), S::to_f64));
+        if !self.carry.is_empty() {
+            for lane in lanes_of(lanes) {
+                let carry = &self.carry[first + lane];
+                out.colors[carry.pixel as usize].radiance += carry.throughput * color(lane);
             }
+        } else if lanes == S::Wide::ALL {
+            // Primary rays, each with a pixel of its own: a loop of known length.
+            let pixels = &mut out.colors[first..first + S::Wide::N];
+            pixels.iter_mut().enumerate().for_each(|(lane, pixel)| pixel.radiance += color(lane));
+        } else {
+            lanes_of(lanes).for_each(|lane| out.colors[first + lane].radiance += color(lane));
         }
     }
 

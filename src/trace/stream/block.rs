@@ -80,6 +80,8 @@ struct Bounds<V> {
     t: (V, V),
     /// Lanes that are live in some vector.
     live: u32,
+    /// By vector.
+    lives: [u32; SIZES[0]],
 }
 
 impl<V: Lanes> Bounds<V> {
@@ -87,9 +89,10 @@ impl<V: Lanes> Bounds<V> {
     #[inline(always)]
     fn of(rays: &Rays<V::Scalar>, starts: &[usize]) -> Self {
         let none = (V::splat(V::Scalar::INFINITY), V::splat(V::Scalar::LOWEST));
-        let mut bounds = Self { org: [none; 3], dir: [none; 3], t: none, live: 0 };
-        for &at in starts {
+        let mut bounds = Self { org: [none; 3], dir: [none; 3], t: none, live: 0, lives: [0; SIZES[0]] };
+        for (&at, of_vector) in starts.iter().zip(&mut bounds.lives) {
             let ([org, dir], [t_min, t_max], live) = Packet::<V>::read(rays, at);
+            *of_vector = live;
             bounds.live |= live;
             if live == V::ALL {
                 let wider = |(low, high): (V, V), x: V| (x.fast_min(low), x.fast_max(high));
@@ -156,13 +159,14 @@ impl<S: Real> Job<'_, S> {
         if !bundle.is_uniform() || !self.list::<V, ANY, COUNT>(tree, &bundle) {
             return false;
         }
+        let vectors = starts.iter().copied().zip(bounds.lives);
         if single {
             let leaves = ObjectLeaves { object: world.first_object(), inst: 0 };
-            self.vectors::<V, _, ANY, COUNT>(tree, &leaves, starts, shared, |packet, query, lanes| {
+            self.vectors::<V, _, ANY, COUNT>(tree, &leaves, vectors, shared, |packet, query, lanes| {
                 leaf::unbounded(leaves.object, 0, packet, query, lanes);
             });
         } else {
-            self.vectors::<V, _, ANY, COUNT>(tree, &TopLeaves(world), starts, shared, |packet, query, lanes| {
+            self.vectors::<V, _, ANY, COUNT>(tree, &TopLeaves(world), vectors, shared, |packet, query, lanes| {
                 for &inst in &world.unbounded_instances {
                     traverse::instance(world, inst, packet, query, lanes);
                 }
@@ -211,21 +215,21 @@ impl<S: Real> Job<'_, S> {
         true
     }
 
-    /// Tests vectors of rays, `shared` if they have one direction, against the listed leaves of `tree`; `first` has what no
-    /// tree holds.
+    /// Tests vectors of rays, given by their places and live lanes, `shared` if they have one direction, against the listed
+    /// leaves of `tree`; `first` has what no tree holds.
     #[inline(always)]
     fn vectors<V: Lanes<Scalar = S>, L: Leaves<V, ANY, COUNT>, const ANY: bool, const COUNT: bool>(
         &mut self,
         tree: &Tree<S>,
         leaves: &L,
-        starts: &[usize],
+        vectors: impl Iterator<Item = (usize, u32)>,
         shared: bool,
         first: impl Fn(&Packet<V>, &mut Query<V, ANY, COUNT>, u32),
     ) {
         let of_triangles = self.world.kinds.triangles;
         let mut last: Option<Packet<V>> = None;
-        for &at in starts {
-            let ([org, dir], [t_min, t_max], live) = Packet::<V>::read(self.rays, at);
+        for (at, live) in vectors {
+            let ([org, dir], [t_min, t_max], _) = Packet::<V>::read(self.rays, at);
             if COUNT {
                 self.counters.rays += u64::from(live.count_ones());
             }
