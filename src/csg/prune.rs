@@ -5,7 +5,7 @@
 //! leaves in each lane. Only operations above a met leaf are touched: the rest of the tree, however large, costs
 //! nothing. Source: Zanni, "Synchronized tracing of primitive-based implicit volumes", 2023 (bottom-up pruning).
 
-use super::tree::{Gate, LeafPlace, Tree};
+use super::tree::{Gate, LeafPlace, Node, Tree};
 
 /// A leaf that some lanes meet.
 #[derive(Clone, Copy, Debug)]
@@ -14,6 +14,8 @@ pub struct Met {
     pub leaf: u32,
     /// Lanes that meet its box.
     pub lanes: u32,
+    /// Where: a place in the search's [`super::solid::Intervals`].
+    pub at: u32,
 }
 
 /// An operation above met leaves.
@@ -64,6 +66,9 @@ impl Pruner {
     /// Cuts `met` (each leaf once) down to the leaves and lanes that matter, and writes the program over them, leaf `i`
     /// of which is `met[i]`.
     pub fn prune(&mut self, tree: &Tree, met: &mut Vec<Met>, program: &mut Program) {
+        if let [only] = &tree.nodes[..] {
+            return prune_one(only, tree, met, program);
+        }
         self.touch(tree, met);
         self.rise(tree, met);
         let root_live = self.touched.first().map_or(0, |t| t.live);
@@ -121,11 +126,7 @@ impl Pruner {
         for i in (0..self.touched.len()).rev() {
             let t = self.touched[i];
             let node = &tree.nodes[t.node as usize];
-            let live = match node.strong_operands {
-                0 => t.any,
-                needed if needed == t.strong => t.all,
-                _ => 0,
-            };
+            let live = live(node, t.any, t.all, t.strong);
             self.touched[i].live = live;
             if i > 0 {
                 self.add(node.parent, node.strong, live);
@@ -145,7 +146,6 @@ impl Pruner {
     fn write(&mut self, tree: &Tree, met: &[Met], program: &mut Program) {
         // Operations that matter nowhere drop out; they stay at their defaults, which are neutral to their parents, or
         // count for an `xor`.
-        let start_of_xor = |t: &Touched| tree.nodes[t.node as usize].default;
         for i in 0..self.touched.len() {
             let t = self.touched[i];
             let node = &tree.nodes[t.node as usize];
@@ -154,17 +154,7 @@ impl Pruner {
             }
             let parent = self.slot[node.parent as usize];
             let parent = if i == 0 { 0 } else { self.touched[parent as usize].strong };
-            let start = match node.gate {
-                Gate::And => u32::MAX,
-                Gate::Or => 0,
-                Gate::Xor => {
-                    if start_of_xor(&t) {
-                        u32::MAX
-                    } else {
-                        0
-                    }
-                }
-            };
+            let start = start(node);
             // From here on `strong` holds the slot in the program.
             self.touched[i].strong = program.gates.len() as u32;
             program.gates.push(GateStep { gate: node.gate, start, parent });
@@ -183,6 +173,53 @@ impl Pruner {
             }
         }
         program.values.resize(program.gates.len(), 0);
+    }
+}
+
+/// The same where there is one operation, as in most solids.
+fn prune_one(only: &Node, tree: &Tree, met: &mut Vec<Met>, program: &mut Program) {
+    program.clear();
+    let (mut any, mut all, mut strong) = (0, u32::MAX, 0);
+    for m in &*met {
+        any |= m.lanes;
+        if tree.leaves[m.leaf as usize].strong {
+            all &= m.lanes;
+            strong += 1;
+        }
+    }
+    let live = live(only, any, all, strong);
+    let mut start = start(only);
+    met.retain_mut(|m| {
+        m.lanes &= live;
+        if m.lanes != 0 {
+            let negated = if tree.leaves[m.leaf as usize].negated { u32::MAX } else { 0 };
+            program.leaves.push(LeafStep { gate: only.gate, negated, parent: 0 });
+            start ^= if only.gate == Gate::Xor { negated } else { 0 };
+        }
+        m.lanes != 0
+    });
+    if live != 0 {
+        program.gates.push(GateStep { gate: only.gate, start, parent: 0 });
+        program.values.push(0);
+    }
+}
+
+/// Where an operation can differ from its default: where all its strong operands can, of which `strong` are met and meet in
+/// `all`, or, without such, where `any` operand can.
+fn live(node: &Node, any: u32, all: u32, strong: u32) -> u32 {
+    match node.strong_operands {
+        0 => any,
+        needed if needed == strong => all,
+        _ => 0,
+    }
+}
+
+/// What operands fold into.
+fn start(node: &Node) -> u32 {
+    match node.gate {
+        Gate::And => u32::MAX,
+        Gate::Or => 0,
+        Gate::Xor => if node.default { u32::MAX } else { 0 },
     }
 }
 

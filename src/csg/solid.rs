@@ -19,6 +19,34 @@ const LAYERS: f64 = 1.0;
 /// More bounded leaves than this are searched by a tree.
 pub(super) const LINEAR: usize = 24;
 
+/// Where the lines of a packet meet boxes.
+#[derive(Debug, Default)]
+pub struct Intervals<S>(Vec<S>);
+
+impl<S: Real> Intervals<S> {
+    /// Forgets them.
+    fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Adds one; its place.
+    #[inline(always)]
+    fn push<V: Lanes<Scalar = S>>(&mut self, interval: &Interval<V>) -> u32 {
+        let at = self.0.len();
+        self.0.resize(at + 2 * V::N, S::ZERO);
+        interval.near.store(&mut self.0[at..]);
+        interval.far.store(&mut self.0[at + V::N..]);
+        at as u32
+    }
+
+    /// The one in a place.
+    #[inline(always)]
+    fn get<V: Lanes<Scalar = S>>(&self, at: u32) -> Interval<V> {
+        let of_box = &self.0[at as usize..];
+        Interval { near: V::load(of_box), far: V::load(&of_box[V::N..]) }
+    }
+}
+
 /// One solid, ready to be traced.
 #[derive(Clone, Debug)]
 pub struct Solid<S> {
@@ -99,10 +127,11 @@ impl<S: Real> Solid<S> {
         lanes: u32,
         eps: V,
         reach: V,
-        met: &mut Vec<Met>,
+        (met, intervals): (&mut Vec<Met>, &mut Intervals<S>),
         stack: &mut Vec<(u32, u32)>,
     ) {
         met.clear();
+        intervals.clear();
         let (start, end) = (packet.t_min - (eps + eps), reach + (eps + eps));
         let meets = |interval: &Interval<V>| {
             let Interval { near, far } = *interval;
@@ -110,9 +139,10 @@ impl<S: Real> Solid<S> {
         };
         for &leaf in &self.always {
             let clip = &self.leaves[leaf as usize].clip;
-            let lanes = meets(&Interval::of(packet, clip.lo, clip.hi)) & lanes;
+            let interval = Interval::of(packet, clip.lo, clip.hi);
+            let lanes = meets(&interval) & lanes;
             if lanes != 0 {
-                met.push(Met { leaf, lanes });
+                met.push(Met { leaf, lanes, at: intervals.push(&interval) });
             }
         }
         let Some((tree, numbers)) = &self.search else { return };
@@ -132,18 +162,19 @@ impl<S: Real> Solid<S> {
             while slots != 0 {
                 let slot = slots.trailing_zeros() as usize;
                 slots &= slots - 1;
-                let lanes = if uniform {
-                    meets(&bundle.interval(packet, node, slot))
+                let interval = if uniform {
+                    bundle.interval(packet, node, slot)
                 } else {
                     let bounds = node.child_bounds(slot);
-                    meets(&Interval::of(packet, bounds.lo, bounds.hi))
-                } & lanes;
+                    Interval::of(packet, bounds.lo, bounds.hi)
+                };
+                let lanes = meets(&interval) & lanes;
                 if lanes == 0 {
                     continue;
                 }
                 let child = node.child(slot);
                 if child.is_leaf() {
-                    met.push(Met { leaf: numbers[child.index as usize], lanes });
+                    met.push(Met { leaf: numbers[child.index as usize], lanes, at: intervals.push(&interval) });
                 } else {
                     stack.push((child.index, lanes));
                 }
@@ -156,7 +187,7 @@ impl<S: Real> Solid<S> {
     pub(super) fn boundaries<V: Lanes<Scalar = S>>(
         &self,
         packet: &Packet<V>,
-        met: &Met,
+        (met, intervals): (&Met, &Intervals<S>),
         slot: u32,
         limit: V,
         eps: V,
@@ -164,8 +195,7 @@ impl<S: Real> Solid<S> {
         crossings: &mut Crossings,
     ) {
         let slack = eps + eps;
-        let clip = &self.leaves[met.leaf as usize].clip;
-        let within = Interval::of(packet, clip.lo, clip.hi);
+        let within = intervals.get::<V>(met.at);
         // Groups of boundaries that begin before the limit end less than `slack` after it.
         if (within.near - slack).cmp_le(limit + slack).bits() & met.lanes != 0 {
             self.boundaries_within(packet, met, slot, (&within, eps), events, crossings);

@@ -9,7 +9,7 @@
 use super::events::Events;
 use super::mesh::Crossings;
 use super::prune::{Met, Program, Pruner};
-use super::solid::Solid;
+use super::solid::{Intervals, Solid};
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
@@ -18,6 +18,7 @@ use crate::ray::slab::Interval;
 #[derive(Debug, Default)]
 pub struct Scratch<S> {
     met: Vec<Met>,
+    intervals: Intervals<S>,
     pruner: Pruner,
     program: Program,
     events: Events<S>,
@@ -126,7 +127,7 @@ fn sole<V: Lanes>(
     let limit = limit.fast_min(V::splat(V::Scalar::MAX));
     let Scratch { met, events, crossings, pruner, program, .. } = scratch;
     met.clear();
-    met.push(Met { leaf: 0, lanes });
+    met.push(Met { leaf: 0, lanes, at: 0 });
     events.clear();
     solid.boundaries_within(packet, &met[0], 0, (interval, eps), events, crossings);
     let count = events.count;
@@ -176,8 +177,8 @@ fn pass<V: Lanes>(
     let mut effort = Effort::default();
     let eps = solid.tolerance(packet);
     let limit = limit.fast_min(V::splat(V::Scalar::MAX));
-    let Scratch { met, pruner, program, events, stack, crossings, .. } = scratch;
-    solid.meet(packet, lanes, eps, reach, met, stack);
+    let Scratch { met, intervals, pruner, program, events, stack, crossings, .. } = scratch;
+    solid.meet(packet, lanes, eps, reach, (met, intervals), stack);
     effort.met = met.len();
     pruner.prune(&solid.tree, met, program);
     effort.kept = met.len();
@@ -185,7 +186,7 @@ fn pass<V: Lanes>(
     let mut pending = 0;
     for (slot, m) in met.iter().enumerate() {
         pending |= m.lanes;
-        solid.boundaries(packet, m, slot as u32, limit, eps, events, crossings);
+        solid.boundaries(packet, (m, intervals), slot as u32, limit, eps, events, crossings);
     }
     effort.events = events.count;
     if !met.is_empty() {

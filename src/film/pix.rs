@@ -30,8 +30,9 @@ pub fn to_bytes(film: &Film, exposure: f32) -> Result<Vec<u8>> {
     let width = film.window.width() as usize;
     let mut bytes = Vec::with_capacity(film.pixels() * CHANNELS);
     for row in (0..film.window.height() as usize).rev() {
-        for i in row * width..(row + 1) * width {
-            bytes.extend(color.map(|plane| level(f64::from(plane[i]) * gain)));
+        let [red, green, blue] = color.map(|plane| &plane[row * width..][..width]);
+        for ((red, green), blue) in red.iter().zip(green).zip(blue) {
+            bytes.extend([red, green, blue].map(|&value| level(f64::from(value) * gain)));
         }
     }
     Ok(bytes)

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::options::RenderOptions;
-use super::patch::Patch;
-use crate::camera::{Camera, Passes, PixelRect, Tiling, fill_passes, fill_pixels, morton_decode, morton_encode};
+use super::patch::{Layout, Patch};
+use crate::camera::{Camera, Passes, PixelRect, Tiling, fill_passes, fill_pixels, morton_decode};
 use crate::lanes::Real;
 use crate::ray::Rays;
 use crate::shade::{Samples, Shader, Spot, Workspace};
@@ -52,11 +52,9 @@ impl Canvas<'_> {
         memory.pixels.extend(places.map(|(dx, dy)| (x0 + dx, y0 + dy)));
     }
 
-    /// Numbers of a tile's pixels, as they are listed, row by row.
-    pub fn by_rows(&self) -> impl Iterator<Item = usize> {
-        let edge = self.tiling.edge();
-        let row = move |y| (0..edge).map(move |x| morton_encode(x, 0) | y);
-        (0..edge).map(|y| morton_encode(0, y)).flat_map(row).map(|number| number as usize)
+    /// The pixels that [`Self::list_pixels`] lists.
+    pub fn layout(&self, tile: u32) -> Layout<'static> {
+        Layout::Square(self.tiling.origin(tile), self.tiling.edge())
     }
 
     /// Traces the samples `numbers` of the pixels of a tile, which `memory` lists, as one batch into `memory.samples`.

@@ -2,9 +2,12 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+
 use super::aov::{Aov, COLOR, Channel, Get};
 use super::pixels::Pixel;
 use super::sums::Finished;
+use crate::camera::morton_encode;
 use crate::film::{Film, Plane, PlaneData, Window};
 use crate::shade::Rgba;
 
@@ -25,6 +28,15 @@ pub(super) fn empty_film(size: (u32, u32), window: Window, channels: &[Channel])
     Film { width: size.0, height: size.1, window, planes, texts: Vec::new() }
 }
 
+/// Which pixels a batch has, in the order of their values.
+#[derive(Clone, Copy)]
+pub(super) enum Layout<'a> {
+    /// These.
+    Listed(&'a [(u32, u32)]),
+    /// Those of a square in Morton order: its upper left pixel and its edge.
+    Square((u32, u32), u32),
+}
+
 /// What the planes get from a batch of pixels: worked out before the film is locked, which is then a matter of copying.
 #[derive(Default)]
 pub(super) struct Patch {
@@ -39,28 +51,10 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// Takes the planes' values of those of `pixels` that lie in `window` from `finished`, parallel to them, and forgets
-    /// earlier ones; `channels` are the same each time. `order` has the numbers of the pixels, row by row if possible:
-    /// neighbours are painted together.
-    pub fn fill(
-        &mut self,
-        channels: &[Channel],
-        window: Window,
-        pixels: &[(u32, u32)],
-        order: impl Iterator<Item = usize>,
-        finished: Finished<'_>,
-    ) {
-        self.runs.clear();
-        self.kept.clear();
-        for number in order {
-            let (x, y) = pixels[number];
-            let Some(place) = window.index(x, y) else { continue };
-            self.kept.push(number as u32);
-            match self.runs.last_mut() {
-                Some(run) if run.end == place => run.end += 1,
-                _ => self.runs.push(place..place + 1),
-            }
-        }
+    /// Takes the planes' values of those pixels of `layout` that lie in `window` from `finished`, parallel to them, and forgets
+    /// earlier ones; `channels` are the same each time.
+    pub fn fill(&mut self, channels: &[Channel], window: Window, layout: Layout<'_>, finished: Finished<'_>) {
+        self.lay_out(window, layout);
         if self.values.is_empty() {
             self.values.extend(channels.iter().map(|channel| match channel.get {
                 Get::F32(_) => PlaneData::F32(Vec::new()),
@@ -75,8 +69,9 @@ impl Patch {
             }
             let lists = r.iter_mut().zip(g).zip(b.iter_mut().zip(a));
             for (((r, g), (b, a)), number) in lists.zip(kept.clone()) {
-                let Rgba { radiance, alpha } = finished.color(number);
-                (*r, *g, *b, *a) = (radiance.x as f32, radiance.y as f32, radiance.z as f32, alpha as f32);
+                let Rgba { radiance: DVec3 { x, y, z }, alpha } = finished.color(number);
+                // Four numbers converted at once.
+                [*r, *g, *b, *a] = [x, y, z, alpha].map(|value| value as f32);
             }
         }
         if further.is_empty() {
@@ -95,6 +90,31 @@ impl Patch {
                     values.extend(self.pixels.iter().map(get));
                 }
                 _ => unreachable!("values are made from the channels"),
+            }
+        }
+    }
+
+    /// Places and numbers of the pixels of `layout` in `window`, neighbours together.
+    fn lay_out(&mut self, window: Window, layout: Layout<'_>) {
+        self.runs.clear();
+        self.kept.clear();
+        match layout {
+            Layout::Listed(pixels) => {
+                for (number, &(x, y)) in pixels.iter().enumerate() {
+                    if let Some(place) = window.index(x, y) {
+                        self.kept.push(number as u32);
+                        self.runs.push(place..place + 1);
+                    }
+                }
+            }
+            Layout::Square((left, top), edge) => {
+                let columns = left.max(window.x0)..(left + edge).min(window.x1);
+                for y in top.max(window.y0)..(top + edge).min(window.y1) {
+                    let Some(place) = window.index(columns.start, y) else { continue };
+                    let row = morton_encode(0, y - top);
+                    self.kept.extend(columns.clone().map(|x| morton_encode(x - left, 0) | row));
+                    self.runs.push(place..place + columns.len());
+                }
             }
         }
     }
@@ -131,9 +151,8 @@ fn copy<T: Copy>(runs: &[Range<usize>], values: &[T], data: &mut [T]) {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
+    use crate::camera::morton_decode;
     use crate::shade::{FirstHit, Samples};
 
     #[test]
@@ -145,8 +164,9 @@ mod tests {
         let hit = FirstHit { distance: 4.0, prim: 9, ..FirstHit::NONE };
         let samples = |count| Samples { colors: vec![color; count], hits: vec![hit; count] };
         let mut patch = Patch::default();
-        patch.fill(&channels, window, &[(4, 2)], 0..1, Finished::Samples(&samples(1)));
-        patch.fill(&channels, window, &[(5, 3), (7, 3), (5, 4)], 0..3, Finished::Samples(&samples(3)));
+        patch.fill(&channels, window, Layout::Listed(&[(4, 2)]), Finished::Samples(&samples(1)));
+        let pixels = [(5, 3), (7, 3), (5, 4)];
+        patch.fill(&channels, window, Layout::Listed(&pixels), Finished::Samples(&samples(3)));
         patch.paint(&mut film);
         assert_eq!(patch.places().collect::<Vec<_>>(), [4]);
         let names: Vec<&str> = film.planes.iter().map(|p| p.name.as_str()).collect();
@@ -158,18 +178,24 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_are_painted_together_and_in_their_places() {
+    fn squares_are_painted_row_by_row() {
         let window = Window { x0: 1, y0: 0, x1: 4, y1: 3 };
         let channels = channels(&[]);
-        let mut film = empty_film((5, 5), window, &channels);
-        let pixels = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, 0), (2, 1), (3, 1), (3, 2)];
-        let shown = |&(x, y): &(u32, u32)| Rgba { radiance: DVec3::splat(f64::from(10 * y + x)), alpha: 1.0 };
-        let samples = Samples { colors: pixels.iter().map(shown).collect(), hits: Vec::new() };
-        let mut patch = Patch::default();
-        let rows = [0, 1, 4, 5, 2, 3, 6, 7, 8];
-        patch.fill(&channels, window, &pixels, rows.into_iter(), Finished::Samples(&samples));
-        patch.paint(&mut film);
-        assert_eq!(patch.runs, [0..6, 8..9]);
-        assert_eq!(film.planes[0].data, PlaneData::F32(vec![1.0, 2.0, 3.0, 11.0, 12.0, 13.0, 0.0, 0.0, 23.0]));
+        let shown = |(x, y): (u32, u32)| Rgba { radiance: DVec3::splat(f64::from(10 * y + x)), alpha: 1.0 };
+        let paint = |corner: (u32, u32), edge: u32| {
+            let mut film = empty_film((5, 5), window, &channels);
+            let pixels: Vec<_> = (0..edge * edge).map(morton_decode).map(|(x, y)| (corner.0 + x, corner.1 + y)).collect();
+            let samples = Samples { colors: pixels.iter().copied().map(shown).collect(), hits: Vec::new() };
+            let mut patch = Patch::default();
+            patch.fill(&channels, window, Layout::Square(corner, edge), Finished::Samples(&samples));
+            patch.paint(&mut film);
+            (patch.runs, film.planes[0].data.clone())
+        };
+        let (runs, red) = paint((0, 0), 2);
+        assert_eq!((runs, red), (vec![0..1, 3..4], PlaneData::F32(vec![1.0, 0.0, 0.0, 11.0, 0.0, 0.0, 0.0, 0.0, 0.0])));
+        let (runs, red) = paint((2, 1), 4);
+        let expected = vec![0.0, 0.0, 0.0, 0.0, 12.0, 13.0, 0.0, 22.0, 23.0];
+        assert_eq!((runs, red), (vec![4..6, 7..9], PlaneData::F32(expected)));
+        assert!(paint((4, 0), 8).0.is_empty() && paint((0, 8), 8).0.is_empty());
     }
 }

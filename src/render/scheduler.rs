@@ -249,6 +249,6 @@ impl<S: Real> Job<'_, S> {
         } else {
             Finished::Sums(&tile.sums, tile.count)
         };
-        memory.patch.fill(&self.channels, self.window, &memory.pixels, self.canvas.by_rows(), finished);
+        memory.patch.fill(&self.channels, self.window, self.canvas.layout(tile.number), finished);
     }
 }

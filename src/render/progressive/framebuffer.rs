@@ -96,7 +96,7 @@ impl Framebuffer {
 mod tests {
     use glam::DVec3;
 
-    use super::super::super::patch::{channels, empty_film};
+    use super::super::super::patch::{Layout, channels, empty_film};
     use super::super::super::sums::Finished;
     use super::*;
     use crate::shade::{Rgba, Samples};
@@ -110,7 +110,7 @@ mod tests {
         let mut put = |frame: &mut Framebuffer, pixel, value| {
             let gray = Rgba { radiance: DVec3::splat(value), alpha: 1.0 };
             let samples = Samples { colors: vec![gray], hits: Vec::new() };
-            patch.fill(&channels, window, &[pixel], 0..1, Finished::Samples(&samples));
+            patch.fill(&channels, window, Layout::Listed(&[pixel]), Finished::Samples(&samples));
             frame.paint(&patch);
         };
         assert_eq!((frame.shown(3, 5), frame.left()), (None, 81));

@@ -26,7 +26,7 @@ pub use steps::{LARGEST_BLOCK, Step};
 use super::aov::{Aov, Channel};
 use super::canvas::{Canvas, Memory};
 use super::options::{Progress, RenderOptions, rect_of};
-use super::patch::{channels, empty_film};
+use super::patch::{Layout, channels, empty_film};
 use super::scheduler::RenderOutput;
 use super::sums::{Finished, Sums};
 use super::tally::Tally;
@@ -223,8 +223,8 @@ impl<'a, S: Real> Progressive<'a, S> {
             if self.canvas.options.spp > 1 {
                 self.keep_first(&memory.pixels, &memory.samples);
             }
-            let (pixels, seen) = (&memory.pixels, Finished::Samples(&memory.samples));
-            memory.patch.fill(&self.channels, self.window, pixels, 0..pixels.len(), seen);
+            let (pixels, seen) = (Layout::Listed(&memory.pixels), Finished::Samples(&memory.samples));
+            memory.patch.fill(&self.channels, self.window, pixels, seen);
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
             self.told(watch, frame, lattice.part(batch), memory)
@@ -272,8 +272,8 @@ impl<'a, S: Real> Progressive<'a, S> {
                 tile.sums.add_passes(passes, &memory.samples);
                 tile.samples += passes.count();
             }
-            let (pixels, sums) = (&memory.pixels, Finished::Sums(&tile.sums, samples));
-            memory.patch.fill(&self.channels, self.window, pixels, self.canvas.by_rows(), sums);
+            let (pixels, sums) = (self.canvas.layout(*number), Finished::Sums(&tile.sums, samples));
+            memory.patch.fill(&self.channels, self.window, pixels, sums);
             let frame = &mut *locked(&self.frame);
             frame.paint(&memory.patch);
             if samples == self.canvas.options.spp {

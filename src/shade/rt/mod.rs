@@ -32,7 +32,6 @@ use self::shadow::Probes;
 use super::sample::{FirstHit, Rgba, Samples};
 use super::shader::{Shader, Workspace};
 use crate::camera::Camera;
-use crate::lanes::chosen::lanes_of;
 use crate::lanes::{Lanes, Real};
 use crate::ray::Rays;
 use crate::scene::assembly::AssemblyObject;
@@ -164,9 +163,13 @@ impl<S: Real> Shader<'_, S> {
             next.clear();
             is_primary = false;
         }
-        for (first, &[live, hit]) in (0..out.colors.len()).step_by(S::Wide::N).zip(&memory.first) {
-            lanes_of(live).for_each(|lane| out.colors[first + lane].alpha = 1.0);
-            lanes_of(hit).for_each(|lane| not_the_background(&mut out.colors[first + lane]));
+        for (pixels, &[live, hit]) in out.colors.chunks_mut(S::Wide::N).zip(&memory.first) {
+            for (lane, pixel) in pixels.iter_mut().enumerate() {
+                pixel.alpha = f64::from(live >> lane & 1);
+                if hit >> lane & 1 != 0 {
+                    not_the_background(pixel);
+                }
+            }
         }
         work.rt = memory;
     }
