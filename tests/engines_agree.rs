@@ -2,18 +2,22 @@
 
 mod common;
 
-use lanecast::ray::{Counters, Hits};
+use lanecast::ray::{Counters, Hits, Rays};
 use lanecast::scene::world::{Preset, World};
 use lanecast::trace::{Engines, Scratch};
 
 fn same_bits<S: Engines>(world: &World<S>, seed: u64, n: usize) -> usize {
-    let rays = common::rays::<S>(n, seed);
+    same_bits_of(world, &common::rays::<S>(n, seed))
+}
+
+fn same_bits_of<S: Engines>(world: &World<S>, rays: &Rays<S>) -> usize {
+    let n = rays.len();
     let mut scratch = Scratch::default();
     let (mut want, mut got) = (Hits::<S>::default(), Hits::<S>::default());
     let (mut any_want, mut any) = (Vec::new(), Vec::new());
     let engines = S::engines();
-    engines[0].intersect(world, &rays, &mut want, &mut scratch, None);
-    engines[0].occluded(world, &rays, &mut any_want, &mut scratch, None);
+    engines[0].intersect(world, rays, &mut want, &mut scratch, None);
+    engines[0].occluded(world, rays, &mut any_want, &mut scratch, None);
     for i in 0..n {
         assert_eq!(any_want[i] == 1, want.is_hit(i), "any-hit and closest-hit differ on ray {i}");
         if want.is_hit(i) {
@@ -25,7 +29,7 @@ fn same_bits<S: Engines>(world: &World<S>, seed: u64, n: usize) -> usize {
     for engine in engines.iter().filter(|e| e.is_exact()) {
         for count in [false, true] {
             let mut counters = Counters::default();
-            engine.intersect(world, &rays, &mut got, &mut scratch, count.then_some(&mut counters));
+            engine.intersect(world, rays, &mut got, &mut scratch, count.then_some(&mut counters));
             for i in 0..n {
                 let bits = |h: &Hits<S>| {
                     let exact = [h.t[i], h.u[i], h.v[i]].map(|x| x.to_f64().to_bits());
@@ -34,7 +38,7 @@ fn same_bits<S: Engines>(world: &World<S>, seed: u64, n: usize) -> usize {
                 assert_eq!(bits(&got), bits(&want), "{} ray {i} count {count}", engine.name());
             }
             assert_eq!(counters.rays, if count { rays.live_count() as u64 } else { 0 });
-            engine.occluded(world, &rays, &mut any, &mut scratch, None);
+            engine.occluded(world, rays, &mut any, &mut scratch, None);
             assert_eq!(any, any_want, "{} any-hit", engine.name());
         }
     }
@@ -73,4 +77,41 @@ fn every_batch_length_and_an_empty_world() {
     let world = World::<f64>::compile(&nothing, Preset::Balanced).unwrap();
     assert_eq!(same_bits(&world, 1, 50), 0);
     assert!(world.bounds().is_none());
+}
+
+/// Nodes that an engine visits.
+fn nodes<S: Engines>(world: &World<S>, rays: &Rays<S>, engine: &str) -> u64 {
+    let (mut hits, mut counters) = (Hits::default(), Counters::default());
+    let engine = lanecast::trace::engine::<S>(engine).unwrap();
+    engine.intersect(world, rays, &mut hits, &mut Scratch::default(), Some(&mut counters));
+    counters.nodes
+}
+
+fn coherent_rays_among_shapes<S: Engines>() {
+    let (mut in_blocks, mut hits) = (0, 0);
+    for seed in 0..12 {
+        // The last ones are too many for the list of a block, or of any.
+        let count = [12, 40, 200, 1500][(seed / 3) as usize];
+        for instances in [false, true] {
+            let world = World::<S>::compile(&common::shapes(seed, count, instances), Preset::Balanced).unwrap();
+            for n in [1024, 900, 17] {
+                let rays = common::coherent::<S>(n, seed);
+                hits += same_bits_of(&world, &rays);
+                in_blocks += u64::from(nodes(&world, &rays, "packet16") > 4 * nodes(&world, &rays, "stream"));
+            }
+        }
+    }
+    assert!(hits > 8000, "only {hits} rays hit");
+    // Else this tests no block: packets of sixteen visit the root once each.
+    assert!(in_blocks >= 8, "{in_blocks} batches went down the tree as blocks");
+}
+
+#[test]
+fn f32_blocks_of_coherent_rays_among_shapes() {
+    coherent_rays_among_shapes::<f32>();
+}
+
+#[test]
+fn f64_blocks_of_coherent_rays_among_shapes() {
+    coherent_rays_among_shapes::<f64>();
 }

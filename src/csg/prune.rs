@@ -219,7 +219,13 @@ fn start(node: &Node) -> u32 {
     match node.gate {
         Gate::And => u32::MAX,
         Gate::Or => 0,
-        Gate::Xor => if node.default { u32::MAX } else { 0 },
+        Gate::Xor => {
+            if node.default {
+                u32::MAX
+            } else {
+                0
+            }
+        }
     }
 }
 

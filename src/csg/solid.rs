@@ -14,8 +14,8 @@ use crate::shape::Span;
 
 /// Boundaries closer than this many roundings of the coordinates are one: 16 half ulps.
 const ROUNDINGS: f64 = 16.0;
-/// Layers of leaves, were they spread evenly, in the first part of a line (tried: 0.5, 1, 2, 4).
-const LAYERS: f64 = 1.0;
+/// Layers of leaves, were they spread evenly, in the first part of a line (tried: 0.5 to 3).
+const LAYERS: f64 = 2.0;
 /// More bounded leaves than this are searched by a tree.
 pub(super) const LINEAR: usize = 24;
 

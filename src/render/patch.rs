@@ -184,7 +184,8 @@ mod tests {
         let shown = |(x, y): (u32, u32)| Rgba { radiance: DVec3::splat(f64::from(10 * y + x)), alpha: 1.0 };
         let paint = |corner: (u32, u32), edge: u32| {
             let mut film = empty_film((5, 5), window, &channels);
-            let pixels: Vec<_> = (0..edge * edge).map(morton_decode).map(|(x, y)| (corner.0 + x, corner.1 + y)).collect();
+            let pixels: Vec<_> =
+                (0..edge * edge).map(morton_decode).map(|(x, y)| (corner.0 + x, corner.1 + y)).collect();
             let samples = Samples { colors: pixels.iter().copied().map(shown).collect(), hits: Vec::new() };
             let mut patch = Patch::default();
             patch.fill(&channels, window, Layout::Square(corner, edge), Finished::Samples(&samples));

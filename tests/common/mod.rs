@@ -157,6 +157,65 @@ pub fn zoo(seed: u64, instances: bool) -> Description {
     d
 }
 
+/// Shapes and no triangles: a heap that a beam of rays meets in part, and a half-space far below, in the root or in
+/// instances.
+pub fn shapes(seed: u64, count: usize, instances: bool) -> Description {
+    let mut r = Random(seed);
+    let mut d = Description::new("shapes");
+    let mut heap = Group { name: "heap".into(), items: Vec::new() };
+    for i in 0..count {
+        let shape = SHAPES[i % SHAPES.len()];
+        let place = DAffine3::from_translation(r.in_cube() * 3.0);
+        if shape != Shape::HalfSpace {
+            heap.items.push(item(ItemKind::Shape(shape), place * r.affine(0.3)));
+        }
+    }
+    let below = DAffine3::from_translation(DVec3::new(0.0, 0.0, -5.0)) * r.affine(0.1);
+    let mut root = Group::default();
+    root.items.push(item(ItemKind::Shape(Shape::HalfSpace), below));
+    if instances {
+        for _ in 0..4 {
+            root.items.push(item(ItemKind::Instance(1), r.affine(0.7)));
+        }
+        d.groups = vec![root, heap];
+    } else {
+        root.items.extend(heap.items);
+        d.groups = vec![root];
+    }
+    d
+}
+
+/// Coherent rays in squares of pixels, Morton order: of a parallel camera, through one eye, or towards one light. Some are dead,
+/// some have ends.
+pub fn coherent<S: Real>(n: usize, seed: u64) -> Rays<S> {
+    let mut r = Random(seed);
+    let mut rays = Rays::new(n);
+    let (dir, eye) = (r.direction(), r.direction() * 9.0);
+    let dir = if seed.is_multiple_of(3) { DVec3::new(0.0, 0.0, -1.0) } else { dir };
+    let (right, up) = dir.any_orthonormal_pair();
+    let side = (n as f64).sqrt().ceil().max(1.0);
+    for i in 0..n {
+        let (x, y) = lanecast::camera::morton_decode(i as u32);
+        let place = right * (f64::from(x) / side - 0.5) * 4.0 + up * (f64::from(y) / side - 0.5) * 4.0;
+        let (org, dir) = match seed % 3 {
+            0 => (place - dir * 8.0, dir),
+            1 => (eye, place - eye),
+            _ => (place, eye - place),
+        };
+        let (mut t_min, mut t_max) = (0.0, if seed % 3 == 2 { 1.0 } else { f64::INFINITY });
+        match i % 61 {
+            7 => (t_min, t_max) = (0.9, 0.2),
+            13 => t_min = 0.5,
+            29 => t_max = 0.6,
+            _ => {}
+        }
+        let exact = |v: DVec3| v.as_vec3().to_array().map(|x| S::from_f64(f64::from(x)));
+        let (t_min, t_max) = (f64::from(t_min as f32), f64::from(t_max as f32));
+        rays.set(i, exact(org), exact(dir), S::from_f64(t_min), S::from_f64(t_max));
+    }
+    rays
+}
+
 /// Rays of all kinds: bundles from one eye, scattered ones, axis-parallel ones, from inside, with short and
 /// inverted segments, long and short directions, dead ones.
 pub fn rays<S: Real>(n: usize, seed: u64) -> Rays<S> {

@@ -12,9 +12,9 @@ use crate::bvh::{Bundle, Child, Tree, WIDTH};
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each, map3};
 use crate::ray::slab::Interval;
 use crate::ray::{HitPacket, Packet, Rays};
+use crate::trace::leaf;
 use crate::trace::query::Query;
 use crate::trace::traverse::{self, Leaves, ObjectLeaves, TopLeaves};
-use crate::trace::leaf;
 
 /// Vectors of rays of a block, and of its parts where it meets too much.
 pub const SIZES: [usize; 2] = [16, 4];
