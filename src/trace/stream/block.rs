@@ -22,7 +22,8 @@ pub const SIZES: [usize; 2] = [16, 4];
 /// Leaves that a block may meet.
 const MOST: usize = 32;
 
-/// Blocks of a size that are left alone after one that met too much, and at most, twice as many each time.
+/// After a block that met too much the next one of its size is left alone, after another failure the next two, then twice as
+/// many each time, up to this many.
 const PATIENCE: u32 = 16;
 
 /// A leaf that some rays may meet.
@@ -41,7 +42,7 @@ struct Listed<S> {
 pub struct Block<S> {
     list: Vec<Listed<S>>,
     waiting: Vec<u32>,
-    /// For each size: blocks to be left alone, and how many it will be after the next that meets too much.
+    /// For each size: blocks still to be left alone, and how many more if the next one meets too much.
     patience: [(u32, u32); SIZES.len()],
 }
 
