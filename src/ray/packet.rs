@@ -54,6 +54,18 @@ impl<V: Lanes> Packet<V> {
         }
     }
 
+    /// Gives its rays the directions `dir`, and what follows from them; with or without the shear.
+    #[inline(always)]
+    pub fn turn(&mut self, dir: Lanes3<V>, sheared: bool) {
+        if sheared {
+            let Self { rcp, dominant, shear, .. } = Self::new(self.org, dir, self.t_min);
+            (self.rcp, self.dominant, self.shear) = (rcp, dominant, shear);
+        } else {
+            self.rcp = map3(dir, finite_rcp);
+        }
+        self.dir = dir;
+    }
+
     /// Rays `first..first + N` of a batch, their `t_max`, and the lanes that are live.
     #[inline(always)]
     pub fn load(rays: &Rays<V::Scalar>, first: usize) -> (Self, V, u32) {

@@ -228,19 +228,22 @@ impl<S: Real> Job<'_, S> {
         first: impl Fn(&Packet<V>, &mut Query<V, ANY, COUNT>, u32),
     ) {
         let of_triangles = self.world.kinds.triangles;
-        let mut last: Option<Packet<V>> = None;
+        // One packet for all, changed in its place: it is too large to be copied.
+        let nothing = [V::constant(0.0); 3];
+        let mut packet = Packet::<V>::unsheared(nothing, nothing, nothing[0]);
+        let mut last = 0;
         for (at, live) in vectors {
             let ([org, dir], [t_min, t_max], _) = Packet::<V>::read(self.rays, at);
             if COUNT {
                 self.counters.rays += u64::from(live.count_ones());
             }
+            (packet.org, packet.t_min) = (org, t_min);
             // What the shear of triangles has for a direction of -0 is not what it has for 0.
-            let packet = match last {
-                Some(last) if shared && live == V::ALL && !of_triangles => Packet { org, dir, t_min, ..last },
-                _ if of_triangles => Packet::new(org, dir, t_min),
-                _ => Packet::unsheared(org, dir, t_min),
-            };
-            last = (live == V::ALL).then_some(packet);
+            if !shared || of_triangles || last & live != V::ALL {
+                packet.turn(dir, of_triangles);
+            }
+            packet.dir = dir;
+            last = live;
             let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
             if live != 0 {
                 first(&packet, &mut query, live);
@@ -261,8 +264,7 @@ impl<S: Real> Job<'_, S> {
                     }
                 }
             }
-            let (hit, done) = (query.hit, query.done);
-            self.output.put(at, &hit, done);
+            self.output.put(at, &query.hit, query.done);
         }
     }
 }
