@@ -2,6 +2,7 @@
 //!
 //! Source of the boxes: Cameron, "Efficient bounds in constructive solid geometry", IEEE CG&A 11(3), 1991 (S-bounds).
 
+use super::direct::Operation;
 use super::leaf::{Leaf, LeafInput, Stores};
 use super::solid::{LINEAR, Solid};
 use super::tree::{Gate, Node, Token, Tree};
@@ -233,6 +234,7 @@ impl<S: Real> Solid<S> {
             search: None,
             always: Vec::new(),
             is_sole: false,
+            operation: None,
         }
     }
 
@@ -247,6 +249,9 @@ impl<S: Real> Solid<S> {
         self.index(preset);
         let leaf_is_all = self.tree.nodes.len() == 1 && self.leaves.len() == 1 && !self.tree.leaves[0].negated;
         self.is_sole = leaf_is_all && self.leaves[0].clip == self.bounds;
+        if self.search.is_none() && self.leaves.iter().all(|leaf| leaf.kind.is_span()) {
+            self.operation = Operation::of(&self.tree, |leaf| self.leaves[leaf as usize].clip == self.bounds);
+        }
         self
     }
 

@@ -5,6 +5,7 @@
 //! the leaves' boundaries. All of it is decided lane by lane, so the bits are the same at every width.
 
 mod build;
+mod direct;
 mod events;
 mod leaf;
 mod mesh;

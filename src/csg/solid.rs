@@ -1,5 +1,6 @@
 //! A compiled solid: leaves, operations, bounds, and a tree over the leaves' boxes where there are many.
 
+use super::direct::{Operands, Operation};
 use super::events::{Events, settled};
 use super::leaf::{Leaf, Stores};
 use super::mesh::Crossings;
@@ -21,28 +22,35 @@ pub(super) const LINEAR: usize = 24;
 
 /// Where the lines of a packet meet boxes.
 #[derive(Debug, Default)]
-pub struct Intervals<S>(Vec<S>);
+pub struct Intervals<S> {
+    /// As long as it ever was: filling it anew costs as much as the boxes.
+    numbers: Vec<S>,
+    len: usize,
+}
 
 impl<S: Real> Intervals<S> {
     /// Forgets them.
     fn clear(&mut self) {
-        self.0.clear();
+        self.len = 0;
     }
 
     /// Adds one; its place.
     #[inline(always)]
     fn push<V: Lanes<Scalar = S>>(&mut self, interval: &Interval<V>) -> u32 {
-        let at = self.0.len();
-        self.0.resize(at + 2 * V::N, S::ZERO);
-        interval.near.store(&mut self.0[at..]);
-        interval.far.store(&mut self.0[at + V::N..]);
+        let at = self.len;
+        self.len += 2 * V::N;
+        if self.numbers.len() < self.len {
+            self.numbers.resize(self.len, S::ZERO);
+        }
+        interval.near.store(&mut self.numbers[at..]);
+        interval.far.store(&mut self.numbers[at + V::N..]);
         at as u32
     }
 
     /// The one in a place.
     #[inline(always)]
     fn get<V: Lanes<Scalar = S>>(&self, at: u32) -> Interval<V> {
-        let of_box = &self.0[at as usize..];
+        let of_box = &self.numbers[at as usize..];
         Interval { near: V::load(of_box), far: V::load(&of_box[V::N..]) }
     }
 }
@@ -67,6 +75,8 @@ pub struct Solid<S> {
     pub(super) always: Vec<u32>,
     /// Whether it is its only leaf, box and all.
     pub(super) is_sole: bool,
+    /// If it is one operation over leaves that lines pass through at most once.
+    pub(super) operation: Option<Operation>,
 }
 
 impl<S: Real> Solid<S> {
@@ -221,6 +231,21 @@ impl<S: Real> Solid<S> {
         let eps = self.tolerance(packet);
         let span = settled(&span, lanes, &widened(interval, eps));
         Some(Span { hit: span.hit & (span.t_in + eps).cmp_lt(span.t_out), ..span })
+    }
+
+    /// Adds where lines `lanes`, which meet a leaf's box in `interval`, are inside of it to `operands`, as the one called `number`:
+    /// the lanes that are at all. `eps`: the tolerance.
+    #[inline(never)]
+    pub(super) fn operand<V: Lanes<Scalar = S>>(
+        &self,
+        packet: &Packet<V>,
+        leaf: u32,
+        (lanes, number): (u32, usize),
+        (interval, eps): (&Interval<V>, V),
+        operands: &mut Operands<S>,
+    ) -> u32 {
+        let span = self.leaves[leaf as usize].span(packet, &self.stores);
+        span.map_or(0, |span| operands.push(number, &settled(&span, lanes, &widened(interval, eps))))
     }
 
     /// Adds the boundaries of a leaf whose box the lines meet in `interval`. `eps`: the tolerance.

@@ -6,6 +6,7 @@
 //! alone. Sources: Roth, "Ray casting for modeling solids", 1982 (boundaries per line); Lefebvre, "IceSL: A GPU
 //! accelerated CSG modeler and slicer", 2013 (sweep over sorted boundaries with early end).
 
+use super::direct::{self, Operands};
 use super::events::Events;
 use super::mesh::Crossings;
 use super::prune::{Met, Program, Pruner};
@@ -22,6 +23,7 @@ pub struct Scratch<S> {
     pruner: Pruner,
     program: Program,
     events: Events<S>,
+    operands: Operands<S>,
     inside: Vec<u32>,
     toggled: Vec<Toggled>,
     stack: Vec<(u32, u32)>,
@@ -70,8 +72,9 @@ pub struct Effort {
 pub enum Depth {
     /// All of it: for who wants every boundary.
     Whole,
-    /// The front part first, then more, as long as lanes need it: for who wants the first boundary. What was reported may
-    /// be reported again.
+    /// The front part first, then more, as long as lanes need it: for who wants the first boundary that is not before the
+    /// segment's start, where boundaries before the solid's box count as there. Those before may be left out; what was reported
+    /// may be reported again.
     FrontFirst,
 }
 
@@ -94,6 +97,15 @@ pub fn sweep<V: Lanes>(
     let mut share = if depth == Depth::Whole { 1.0 } else { solid.front() };
     let start = interval.near.fast_max(packet.t_min);
     let mut lanes = lanes;
+    if depth == Depth::FrontFirst
+        && let Some(operation) = &solid.operation
+    {
+        let (direct, rest) = direct::first(solid, operation, packet, (lanes, interval), limit, &mut scratch.operands, &mut found);
+        if rest == 0 {
+            return direct;
+        }
+        (effort, lanes) = (direct, rest);
+    }
     loop {
         // Parts are shares of the lane's own way, so that they are the same in a packet of any width.
         let part = (interval.far - start) * V::constant(share) + start;

@@ -17,6 +17,7 @@ mod ftz;
 pub mod functions;
 mod isa;
 mod moved;
+mod pages;
 mod pair;
 pub mod past;
 mod scalar;
@@ -31,6 +32,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 pub use ftz::FlushDenormals;
 pub use isa::{compiled_features, compiled_isa};
+pub use pages::ask_for_large_pages;
 pub use pair::Pair;
 
 /// Single-precision vectors by width.

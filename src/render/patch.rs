@@ -9,6 +9,7 @@ use super::pixels::Pixel;
 use super::sums::Finished;
 use crate::camera::morton_encode;
 use crate::film::{Film, Plane, PlaneData, Window};
+use crate::lanes::ask_for_large_pages;
 use crate::shade::Rgba;
 
 /// The planes of a picture: colour, coverage, and those of `aovs`.
@@ -24,7 +25,14 @@ pub(super) fn empty_film(size: (u32, u32), window: Window, channels: &[Channel])
         Get::F32(get) => PlaneData::F32(vec![get(&Pixel::EMPTY) as f32; area]),
         Get::U32(get) => PlaneData::U32(vec![get(&Pixel::EMPTY); area]),
     };
-    let planes = channels.iter().map(|channel| Plane { name: channel.name.to_string(), data: data(channel) }).collect();
+    let plane = |channel: &Channel| Plane { name: channel.name.to_string(), data: data(channel) };
+    let planes: Vec<Plane> = channels.iter().map(plane).collect();
+    for plane in &planes {
+        match &plane.data {
+            PlaneData::F32(values) => ask_for_large_pages(values),
+            PlaneData::U32(values) => ask_for_large_pages(values),
+        }
+    }
     Film { width: size.0, height: size.1, window, planes, texts: Vec::new() }
 }
 
