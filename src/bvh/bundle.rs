@@ -13,13 +13,14 @@ use crate::ray::slab::{Interval, pad};
 /// Bounds over some lanes of a packet.
 #[derive(Clone, Copy, Debug)]
 pub struct Bundle<S> {
-    uniform: bool,
+    /// Per axis: whether there are lanes that look up and lanes that look down.
+    mixed: [bool; 3],
     /// Per axis: index of the plane that is met first (0 low, 1 high).
     near_side: [usize; 3],
     /// Origins that give the earliest entry and the latest exit.
     org_near: [S; 3],
     org_far: [S; 3],
-    /// Smallest and largest reciprocal direction.
+    /// Smallest and largest reciprocal direction; on mixed axes those of the steepest lanes down and up.
     rcp: [(S, S); 3],
     /// Start of the earliest segment, end of the longest.
     t_min: S,
@@ -31,7 +32,14 @@ impl<S: Real> Bundle<S> {
     /// Bounds over `lanes` (not empty) of `packet`, whose segments end at `t_max`.
     #[inline(always)]
     pub fn of<V: Lanes<Scalar = S>>(packet: &Packet<V>, lanes: u32, t_max: V) -> Self {
-        let rcp = map3(packet.rcp, |r| r.range(lanes));
+        let rcp = each(|axis| {
+            let (low, high) = packet.rcp[axis].range(lanes);
+            if !is_mixed((low, high)) {
+                return (low, high);
+            }
+            let (down, up) = packet.dir[axis].range(lanes);
+            (finite_rcp(down), finite_rcp(up))
+        });
         let org = map3(packet.org, |o| o.range(lanes));
         Self::new(org, rcp, packet.t_min.range(lanes).0, t_max.range(lanes).1, lanes)
     }
@@ -40,15 +48,19 @@ impl<S: Real> Bundle<S> {
     /// segments lie within `t_min..=reach`.
     #[inline(always)]
     pub fn spanning(org: [(S, S); 3], dir: [(S, S); 3], t_min: S, reach: S) -> Self {
-        // The reciprocal falls from the least to the largest number of one sign, also rounded; else the bundle is not uniform.
-        Self::new(org, map3(dir, |(low, high)| (finite_rcp(high), finite_rcp(low))), t_min, reach, u32::MAX)
+        // The reciprocal falls from the least to the largest number of one sign, also rounded; else the axis is mixed.
+        let rcp = map3(dir, |(low, high)| match (finite_rcp(low), finite_rcp(high)) {
+            rcp if is_mixed(rcp) => rcp,
+            (of_low, of_high) => (of_high, of_low),
+        });
+        Self::new(org, rcp, t_min, reach, u32::MAX)
     }
 
     #[inline(always)]
     fn new(org: [(S, S); 3], rcp: [(S, S); 3], t_min: S, reach: S, lanes: u32) -> Self {
         let backward = map3(rcp, |(low, _)| low < S::ZERO);
         Self {
-            uniform: rcp.iter().all(|(low, high)| (*low < S::ZERO) == (*high < S::ZERO)),
+            mixed: map3(rcp, is_mixed),
             near_side: map3(backward, usize::from),
             org_near: each(|a| if backward[a] { org[a].0 } else { org[a].1 }),
             org_far: each(|a| if backward[a] { org[a].1 } else { org[a].0 }),
@@ -66,10 +78,10 @@ impl<S: Real> Bundle<S> {
         self
     }
 
-    /// Whether all lanes look into one octant: only then can the bundle be tested as a whole.
+    /// Whether all lanes look into one octant: only then is there [`Self::interval`].
     #[inline(always)]
     pub fn is_uniform(&self) -> bool {
-        self.uniform
+        self.mixed == [false; 3]
     }
 
     /// Takes in that hits were found.
@@ -84,6 +96,9 @@ impl<S: Real> Bundle<S> {
         let one_ray = V::N == 1;
         let axis = |a: usize| {
             let (r0, r1) = (S::Octo::splat(self.rcp[a].0), S::Octo::splat(self.rcp[a].1));
+            if !one_ray && self.mixed[a] {
+                return (self.enter_mixed(node, a), S::Octo::splat(S::INFINITY));
+            }
             let (near_plane, far_plane) = self.planes(node, a);
             let enter = S::Octo::load(near_plane) - S::Octo::splat(self.org_near[a]);
             let leave = S::Octo::load(far_plane) - S::Octo::splat(self.org_far[a]);
@@ -97,6 +112,22 @@ impl<S: Real> Bundle<S> {
         let interval = Interval { near: x.0.fast_max(y.0).fast_max(z.0), far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
         interval.near.store(near);
         interval.meets(S::Octo::splat(self.t_min), S::Octo::splat(self.reach)).bits()
+    }
+
+    /// Where lanes enter the children's slabs along a mixed axis, at the earliest: a slab above all origins only those that look up
+    /// meet, after their start, and not before the steepest of them.
+    #[inline(always)]
+    fn enter_mixed(&self, node: &Node<S>, axis: usize) -> S::Octo {
+        // Before it they may come from the other side.
+        if self.t_min < S::ZERO {
+            return S::Octo::splat(S::LOWEST);
+        }
+        let [low, high] = &node.bounds[axis];
+        // Backwards, as the first is below zero: the origins that are farthest up and down.
+        let (up, down) = (S::Octo::splat(self.org_far[axis]), S::Octo::splat(self.org_near[axis]));
+        let from_below = (S::Octo::load(low) - up) * S::Octo::splat(self.rcp[axis].1);
+        let from_above = (S::Octo::load(high) - down) * S::Octo::splat(self.rcp[axis].0);
+        from_below.fast_max(from_above)
     }
 
     /// One child's box test for every lane of a uniform packet: no minima and maxima per axis.
@@ -115,4 +146,10 @@ impl<S: Real> Bundle<S> {
         let [low, high] = &node.bounds[axis];
         if self.near_side[axis] == 0 { (low, high) } else { (high, low) }
     }
+}
+
+/// Whether reciprocals from the first to the second are of both signs.
+#[inline(always)]
+fn is_mixed<S: Real>((low, high): (S, S)) -> bool {
+    (low < S::ZERO) != (high < S::ZERO)
 }

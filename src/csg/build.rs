@@ -234,6 +234,8 @@ impl<S: Real> Solid<S> {
             search: None,
             always: Vec::new(),
             is_sole: false,
+            is_span: false,
+            front: 1.0,
             operation: None,
         }
     }
@@ -249,8 +251,11 @@ impl<S: Real> Solid<S> {
         self.index(preset);
         let leaf_is_all = self.tree.nodes.len() == 1 && self.leaves.len() == 1 && !self.tree.leaves[0].negated;
         self.is_sole = leaf_is_all && self.leaves[0].clip == self.bounds;
-        if self.search.is_none() && self.leaves.iter().all(|leaf| leaf.kind.is_span()) {
-            self.operation = Operation::of(&self.tree, |leaf| self.leaves[leaf as usize].clip == self.bounds);
+        self.is_span = self.is_sole && self.leaves[0].kind.is_span();
+        self.front = self.front_share();
+        if self.leaves.iter().all(|leaf| leaf.kind.is_span()) {
+            let operation = Operation::of(&self.tree, |leaf| self.leaves[leaf].clip == self.bounds);
+            self.operation = operation.map(Box::new);
         }
         self
     }

@@ -9,6 +9,8 @@ mod direct;
 mod events;
 mod leaf;
 mod mesh;
+mod nearest;
+mod operands;
 mod prune;
 mod solid;
 mod sweep;
@@ -19,3 +21,6 @@ pub use leaf::{Form, LeafInput, Triangles};
 pub use solid::Solid;
 pub use sweep::{Boundary, Depth, Effort, Scratch, sweep};
 pub use tree::{Op, Token};
+
+#[cfg(test)]
+mod tests;

@@ -16,6 +16,15 @@ pub struct Met {
     pub lanes: u32,
     /// Where: a place in the search's [`super::solid::Intervals`].
     pub at: u32,
+    /// Number of the operand that it has become, or one of the two below.
+    pub operand: u32,
+}
+
+impl Met {
+    /// Not looked at yet.
+    pub const UNSEEN: u32 = u32::MAX;
+    /// Its leaf is not met after all.
+    pub const MISSED: u32 = u32::MAX - 1;
 }
 
 /// An operation above met leaves.

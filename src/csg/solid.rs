@@ -1,13 +1,14 @@
 //! A compiled solid: leaves, operations, bounds, and a tree over the leaves' boxes where there are many.
 
-use super::direct::{Operands, Operation};
+use super::direct::Operation;
 use super::events::{Events, settled};
 use super::leaf::{Leaf, Stores};
 use super::mesh::Crossings;
+use super::operands;
 use super::prune::Met;
 use super::tree::Tree;
 use crate::bvh::{self, Bundle};
-use crate::lanes::{LaneMask, Lanes, Real};
+use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::math::Aabb;
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
@@ -49,10 +50,18 @@ impl<S: Real> Intervals<S> {
 
     /// The one in a place.
     #[inline(always)]
-    fn get<V: Lanes<Scalar = S>>(&self, at: u32) -> Interval<V> {
+    pub(super) fn get<V: Lanes<Scalar = S>>(&self, at: u32) -> Interval<V> {
         let of_box = &self.numbers[at as usize..];
         Interval { near: V::load(of_box), far: V::load(&of_box[V::N..]) }
     }
+}
+
+/// Which leaves a packet's lines meet.
+#[derive(Debug, Default)]
+pub struct Search<S> {
+    pub(super) met: Vec<Met>,
+    pub(super) intervals: Intervals<S>,
+    stack: Vec<(u32, u32)>,
 }
 
 /// One solid, ready to be traced.
@@ -75,8 +84,12 @@ pub struct Solid<S> {
     pub(super) always: Vec<u32>,
     /// Whether it is its only leaf, box and all.
     pub(super) is_sole: bool,
+    /// Whether it is and lines pass through that leaf at most once.
+    pub(super) is_span: bool,
+    /// Share of a line's way through it that is looked at first.
+    pub(super) front: f64,
     /// If it is one operation over leaves that lines pass through at most once.
-    pub(super) operation: Option<Operation>,
+    pub(super) operation: Option<Box<Operation>>,
 }
 
 impl<S: Real> Solid<S> {
@@ -121,7 +134,7 @@ impl<S: Real> Solid<S> {
     }
 
     /// Share of a line's way through the solid that is looked at first: a few layers of leaves, were they spread evenly.
-    pub(super) fn front(&self) -> f64 {
+    pub(super) fn front_share(&self) -> f64 {
         if self.search.is_none() || !self.bounds.is_bounded() {
             1.0
         } else {
@@ -137,9 +150,9 @@ impl<S: Real> Solid<S> {
         lanes: u32,
         eps: V,
         reach: V,
-        (met, intervals): (&mut Vec<Met>, &mut Intervals<S>),
-        stack: &mut Vec<(u32, u32)>,
+        search: &mut Search<S>,
     ) {
+        let Search { met, intervals, stack } = search;
         met.clear();
         intervals.clear();
         let (start, end) = (packet.t_min - (eps + eps), reach + (eps + eps));
@@ -152,7 +165,7 @@ impl<S: Real> Solid<S> {
             let interval = Interval::of(packet, clip.lo, clip.hi);
             let lanes = meets(&interval) & lanes;
             if lanes != 0 {
-                met.push(Met { leaf, lanes, at: intervals.push(&interval) });
+                met.push(Met { leaf, lanes, at: intervals.push(&interval), operand: Met::UNSEEN });
             }
         }
         let Some((tree, numbers)) = &self.search else { return };
@@ -167,8 +180,7 @@ impl<S: Real> Solid<S> {
         while let Some((node, lanes)) = stack.pop() {
             let node = &tree.nodes[node as usize];
             let uniform = bundle.is_uniform();
-            let mut slots = if uniform { bundle.children::<V>(node, &mut near) } else { u32::MAX };
-            slots &= (1 << node.used) - 1;
+            let mut slots = bundle.children::<V>(node, &mut near) & ((1 << node.used) - 1);
             while slots != 0 {
                 let slot = slots.trailing_zeros() as usize;
                 slots &= slots - 1;
@@ -184,7 +196,8 @@ impl<S: Real> Solid<S> {
                 }
                 let child = node.child(slot);
                 if child.is_leaf() {
-                    met.push(Met { leaf: numbers[child.index as usize], lanes, at: intervals.push(&interval) });
+                    let leaf = numbers[child.index as usize];
+                    met.push(Met { leaf, lanes, at: intervals.push(&interval), operand: Met::UNSEEN });
                 } else {
                     stack.push((child.index, lanes));
                 }
@@ -215,7 +228,7 @@ impl<S: Real> Solid<S> {
     /// Whether it is its only leaf and lines pass through that at most once.
     #[inline(always)]
     pub fn is_span(&self) -> bool {
-        self.is_sole && self.leaves[0].kind.is_span()
+        self.is_span
     }
 
     /// Where lines `lanes`, which meet its box in `interval`, are inside of a solid that [`Self::is_span`]; lines that only touch
@@ -233,19 +246,19 @@ impl<S: Real> Solid<S> {
         Some(Span { hit: span.hit & (span.t_in + eps).cmp_lt(span.t_out), ..span })
     }
 
-    /// Adds where lines `lanes`, which meet a leaf's box in `interval`, are inside of it to `operands`, as the one called `number`:
-    /// the lanes that are at all. `eps`: the tolerance.
+    /// Where lines `lanes`, which meet a leaf's box in `interval`, are inside of it, if it is of a kind that lines pass through at
+    /// most once: entry, exit and their faces to `to`. The lanes that are at all. `eps`: the tolerance.
     #[inline(never)]
     pub(super) fn operand<V: Lanes<Scalar = S>>(
         &self,
         packet: &Packet<V>,
         leaf: u32,
-        (lanes, number): (u32, usize),
+        lanes: u32,
         (interval, eps): (&Interval<V>, V),
-        operands: &mut Operands<S>,
+        to: &mut [[S; MAX_LANES]; 4],
     ) -> u32 {
         let span = self.leaves[leaf as usize].span(packet, &self.stores);
-        span.map_or(0, |span| operands.push(number, &settled(&span, lanes, &widened(interval, eps))))
+        span.map_or(0, |span| operands::write(&settled(&span, lanes, &widened(interval, eps)), to))
     }
 
     /// Adds the boundaries of a leaf whose box the lines meet in `interval`. `eps`: the tolerance.

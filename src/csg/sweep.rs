@@ -6,11 +6,12 @@
 //! alone. Sources: Roth, "Ray casting for modeling solids", 1982 (boundaries per line); Lefebvre, "IceSL: A GPU
 //! accelerated CSG modeler and slicer", 2013 (sweep over sorted boundaries with early end).
 
-use super::direct::{self, Operands};
+use super::direct::{self, Part};
 use super::events::Events;
 use super::mesh::Crossings;
+use super::operands::Operands;
 use super::prune::{Met, Program, Pruner};
-use super::solid::{Intervals, Solid};
+use super::solid::{Search, Solid};
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
@@ -18,15 +19,13 @@ use crate::ray::slab::Interval;
 /// What a packet needs while it sweeps; grows on use, for any solid.
 #[derive(Debug, Default)]
 pub struct Scratch<S> {
-    met: Vec<Met>,
-    intervals: Intervals<S>,
+    search: Search<S>,
     pruner: Pruner,
     program: Program,
     events: Events<S>,
     operands: Operands<S>,
     inside: Vec<u32>,
     toggled: Vec<Toggled>,
-    stack: Vec<(u32, u32)>,
     crossings: Crossings,
 }
 
@@ -93,30 +92,40 @@ pub fn sweep<V: Lanes>(
     if solid.is_sole {
         return sole(solid, packet, (lanes, interval), limit, scratch, found);
     }
+    let operation = solid.operation.as_ref().filter(|_| depth == Depth::FrontFirst);
+    let limit = limit.fast_min(V::splat(V::Scalar::MAX));
+    let everything = V::splat(V::Scalar::INFINITY);
+    if solid.search.is_none() {
+        let part = Part { packet, lanes, interval, limit, reach: everything };
+        let Some(operation) = operation else { return pass(solid, part, scratch, found) };
+        let (effort, rest) = direct::first(solid, operation, part, None, &mut scratch.operands, &mut found);
+        return if rest == 0 { effort } else { effort + pass(solid, Part { lanes: rest, ..part }, scratch, found) };
+    }
     let mut effort = Effort::default();
-    let mut share = if depth == Depth::Whole { 1.0 } else { solid.front() };
+    let mut share = if depth == Depth::Whole { 1.0 } else { solid.front };
     let start = interval.near.fast_max(packet.t_min);
     let mut lanes = lanes;
-    if depth == Depth::FrontFirst
-        && let Some(operation) = &solid.operation
-    {
-        let (direct, rest) = direct::first(solid, operation, packet, (lanes, interval), limit, &mut scratch.operands, &mut found);
-        if rest == 0 {
-            return direct;
-        }
-        (effort, lanes) = (direct, rest);
-    }
     loop {
         // Parts are shares of the lane's own way, so that they are the same in a packet of any width.
-        let part = (interval.far - start) * V::constant(share) + start;
+        let end = (interval.far - start) * V::constant(share) + start;
         let whole = share >= 1.0;
-        let reach = if whole { V::splat(V::Scalar::INFINITY) } else { part };
+        let reach = if whole { everything } else { end };
         let mut done = 0;
-        effort += pass(solid, packet, lanes, limit.fast_min(reach), reach, scratch, |boundary| {
+        let mut found = |boundary: &Boundary<V>| {
             let lanes = found(boundary);
             done |= lanes;
             lanes
-        });
+        };
+        let part = Part { packet, lanes, interval, limit: limit.fast_min(reach), reach };
+        let mut rest = lanes;
+        if let Some(operation) = operation {
+            let Scratch { search, operands, .. } = scratch;
+            let (direct, left) = direct::first(solid, operation, part, Some(search), operands, &mut found);
+            (effort, rest) = (effort + direct, left);
+        }
+        if rest != 0 {
+            effort = effort + pass(solid, Part { lanes: rest, ..part }, scratch, &mut found);
+        }
         lanes &= !done & reach.cmp_lt(limit).bits();
         if whole || lanes == 0 {
             return effort;
@@ -137,9 +146,10 @@ fn sole<V: Lanes>(
 ) -> Effort {
     let eps = solid.tolerance(packet);
     let limit = limit.fast_min(V::splat(V::Scalar::MAX));
-    let Scratch { met, events, crossings, pruner, program, .. } = scratch;
+    let Scratch { search, events, crossings, pruner, program, .. } = scratch;
+    let met = &mut search.met;
     met.clear();
-    met.push(Met { leaf: 0, lanes, at: 0 });
+    met.push(Met { leaf: 0, lanes, at: 0, operand: Met::UNSEEN });
     events.clear();
     solid.boundaries_within(packet, &met[0], 0, (interval, eps), events, crossings);
     let count = events.count;
@@ -166,31 +176,28 @@ fn sole<V: Lanes>(
     Effort { met: 1, kept: 1, events: 2, steps: 1 + usize::from(leaves != 0) }
 }
 
-impl std::ops::AddAssign for Effort {
-    fn add_assign(&mut self, o: Self) {
-        self.met += o.met;
-        self.kept += o.kept;
-        self.events += o.events;
-        self.steps += o.steps;
+impl std::ops::Add for Effort {
+    type Output = Self;
+    fn add(self, o: Self) -> Self {
+        let (met, kept) = (self.met + o.met, self.kept + o.kept);
+        Self { met, kept, events: self.events + o.events, steps: self.steps + o.steps }
     }
 }
 
-/// One sweep over the leaves that begin before `reach`.
+/// One sweep over a part of the solid.
 #[inline(always)]
 fn pass<V: Lanes>(
     solid: &Solid<V::Scalar>,
-    packet: &Packet<V>,
-    lanes: u32,
-    limit: V,
-    reach: V,
+    part: Part<'_, V>,
     scratch: &mut Scratch<V::Scalar>,
     found: impl FnMut(&Boundary<V>) -> u32,
 ) -> Effort {
+    let Part { packet, lanes, limit, reach, .. } = part;
     let mut effort = Effort::default();
     let eps = solid.tolerance(packet);
-    let limit = limit.fast_min(V::splat(V::Scalar::MAX));
-    let Scratch { met, intervals, pruner, program, events, stack, crossings, .. } = scratch;
-    solid.meet(packet, lanes, eps, reach, (met, intervals), stack);
+    let Scratch { search, pruner, program, events, crossings, .. } = scratch;
+    solid.meet(packet, lanes, eps, reach, search);
+    let Search { met, intervals, .. } = search;
     effort.met = met.len();
     pruner.prune(&solid.tree, met, program);
     effort.kept = met.len();
@@ -216,7 +223,8 @@ fn walk<V: Lanes>(
     eps: V,
     mut found: impl FnMut(&Boundary<V>) -> u32,
 ) -> usize {
-    let Scratch { met, program, events, inside, toggled, .. } = scratch;
+    let Scratch { search, program, events, inside, toggled, .. } = scratch;
+    let met = &search.met;
     let mut steps = 0;
     inside.clear();
     inside.resize(met.len(), 0);

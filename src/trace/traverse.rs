@@ -168,7 +168,7 @@ fn children<V: Lanes, const ANY: bool, const COUNT: bool, const UNIFORM: bool>(
 ) -> (Child, u32) {
     // First the packet as a whole against all eight boxes. Where the first lane enters is near enough to go by.
     let mut keys = [V::Scalar::ZERO; WIDTH];
-    let mut hit = if UNIFORM { bundle.children::<V>(node, &mut keys) } else { u32::MAX } & ((1 << node.used) - 1);
+    let mut hit = bundle.children::<V>(node, &mut keys) & ((1 << node.used) - 1);
     let mut nears = [V::constant(0.0); WIDTH];
     let mut meets = [lanes; WIDTH];
     // Slots by distance, nearest last; any-hit keeps the node's own order (large children first), slot 0 last.

@@ -125,7 +125,7 @@ impl<S: Real> Level<S> {
     }
 }
 
-/// What the rays of a batch have met. Entries of rays that met nothing mean nothing.
+/// What the rays of a batch have met. Entries of rays that met nothing mean nothing; arrays by ray may be longer than the batch.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Found<S> {
     /// Distance along the ray.
@@ -151,10 +151,13 @@ impl<S: Real> Found<S> {
 
     /// Nothing yet, of `padded` rays; [`Self::set_vector`] sets some.
     pub fn open(&mut self, padded: usize) {
-        for array in self.position.iter_mut().chain(&mut self.normal).chain([&mut self.t]) {
-            array.resize(padded, S::ZERO);
+        // Longer ones stay as they are: filling them anew takes time.
+        if self.t.len() < padded {
+            for array in self.position.iter_mut().chain(&mut self.normal).chain([&mut self.t]) {
+                array.resize(padded, S::ZERO);
+            }
+            self.region.resize(padded, 0);
         }
-        self.region.resize(padded, 0);
         self.hit.resize(padded / S::Wide::N, 0);
         self.leaving.resize(padded / S::Wide::N, 0);
     }

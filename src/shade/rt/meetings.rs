@@ -20,7 +20,11 @@ pub(super) struct Meetings<S> {
     pub finish: [Vec<S>; 3],
     /// What they show.
     pub color: [Vec<S>; 3],
-    /// How much of a light arrives.
+    /// Unit directions to a light.
+    pub to_light: [Vec<S>; 3],
+    /// Of each vector of lanes: those that it may light.
+    pub facing: Vec<u32>,
+    /// How much of it arrives.
     pub visible: Vec<S>,
 }
 
@@ -40,11 +44,13 @@ pub(super) struct Kinds {
 }
 
 impl<S: Real> Meetings<S> {
-    /// None yet, of a level of `padded` rays with its padding.
+    /// None yet, of a level of `padded` rays with its padding. Arrays by ray may be longer.
     pub fn open(&mut self, padded: usize) {
         self.kinds.clear();
-        let lists = [&mut self.base, &mut self.finish, &mut self.color];
-        for array in lists.into_iter().flatten().chain([&mut self.visible]) {
+        self.facing.resize(padded / S::Wide::N, 0);
+        let lists = [&mut self.base, &mut self.finish, &mut self.color, &mut self.to_light];
+        // Longer ones stay as they are: filling them anew takes time.
+        for array in lists.into_iter().flatten().chain([&mut self.visible]).filter(|array| array.len() < padded) {
             array.resize(padded, S::ZERO);
         }
     }
@@ -90,10 +96,9 @@ impl<S: Real> Meetings<S> {
         self.kinds.push(kinds);
     }
 
-    /// Vectors with lanes that enter a region: the number of their first ray, and which.
-    pub fn packets(&self) -> impl Iterator<Item = (usize, Kinds)> {
-        let numbered = self.kinds.iter().enumerate().filter(|(_, kinds)| kinds.entering != 0);
-        numbered.map(|(k, &kinds)| (k * S::Wide::N, kinds))
+    /// How many rays the level has, with its padding.
+    pub fn padded(&self) -> usize {
+        self.kinds.len() * S::Wide::N
     }
 }
 

@@ -6,11 +6,11 @@ use super::glass::{self, refract};
 use super::lamp::Lamp;
 use super::level::{Found, Level, vector};
 use super::material::Finish;
-use super::meetings::{Kinds, Meetings};
+use super::meetings::Meetings;
 use super::shadow::Probes;
 use super::{AIR, AMBIENT, MAX_BOUNCES, Memory, Path, Rt, TOLERANCE, Within};
 use crate::lanes::chosen::lanes_of;
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, space};
+use crate::lanes::{LaneMask, Lanes, Real, dot, each, space};
 use crate::shade::sample::Samples;
 use crate::shade::shader::{Shader, Workspace};
 
@@ -27,11 +27,13 @@ impl<S: Real> Shader<'_, S> {
         let Memory { level, found, meetings, probes, next_probes, shadow, .. } = memory;
         unlit(rt, level, found, meetings);
         for lamp in rt.lamps.iter().rev() {
+            let padded = meetings.padded();
+            face(lamp, found, meetings);
             if lamp.region.is_none() {
-                meetings.visible.fill(S::ONE);
+                meetings.visible[..padded].fill(S::ONE);
             } else {
-                aim(lamp, found, meetings, probes);
-                meetings.visible.fill(S::ZERO);
+                aim(found, meetings, probes);
+                meetings.visible[..padded].fill(S::ZERO);
                 self.rt_visible(rt, probes, next_probes, shadow, &mut meetings.visible, work);
             }
             light(lamp, level, found, meetings);
@@ -75,24 +77,32 @@ fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Me
     }
 }
 
-/// Unit directions to the light, and the lanes that it may light.
-#[inline(always)]
-fn towards<S: Real>(lamp: &Lamp, found: &Found<S>, kinds: Kinds, first: usize) -> (Lanes3<S::Wide>, u32) {
-    let splat = |v: DVec3| v.to_array().map(S::Wide::constant);
-    let to_light = space::normalize(space::sub(splat(lamp.position), vector(&found.position, first)));
-    let in_front = S::Wide::constant(0.0).cmp_le(dot(vector(&found.normal, first), to_light)).bits();
-    let in_cone = S::Wide::constant(lamp.cosine).cmp_le(S::Wide::constant(0.0) - dot(to_light, splat(lamp.aim))).bits();
-    (to_light, (in_front | kinds.transmits) & in_cone & kinds.lit)
+/// Finds the directions to `lamp`, and the lanes that it may light.
+fn face<S: Real>(lamp: &Lamp, found: &Found<S>, meetings: &mut Meetings<S>) {
+    let splat = |v: DVec3| each(|axis| S::Wide::constant(v[axis]));
+    let Meetings { kinds, to_light, facing, .. } = meetings;
+    for (k, kinds) in kinds.iter().enumerate() {
+        if kinds.lit == 0 {
+            facing[k] = 0;
+            continue;
+        }
+        let first = k * S::Wide::N;
+        let dir = space::normalize(space::sub(splat(lamp.position), vector(&found.position, first)));
+        let in_front = S::Wide::constant(0.0).cmp_le(dot(vector(&found.normal, first), dir)).bits();
+        let in_cone = S::Wide::constant(lamp.cosine).cmp_le(S::Wide::constant(0.0) - dot(dir, splat(lamp.aim))).bits();
+        facing[k] = (in_front | kinds.transmits) & in_cone & kinds.lit;
+        (0..3).for_each(|axis| dir[axis].store(&mut to_light[axis][first..]));
+    }
 }
 
-/// Shadow rays from the meetings to `lamp`.
-fn aim<S: Real>(lamp: &Lamp, found: &Found<S>, meetings: &Meetings<S>, probes: &mut Probes<S>) {
-    probes.open(found.t.len());
-    for (first, kinds) in meetings.packets() {
-        let (to_light, lit) = towards(lamp, found, kinds, first);
-        let position = vector(&found.position, first);
-        let org = each(|axis| to_light[axis].mul_add(S::Wide::constant(TOLERANCE), position[axis]));
-        probes.push(first, lit, org, to_light);
+/// Shadow rays from the meetings to the light that they face.
+fn aim<S: Real>(found: &Found<S>, meetings: &Meetings<S>, probes: &mut Probes<S>) {
+    probes.open(meetings.padded());
+    for (k, &facing) in meetings.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
+        let first = k * S::Wide::N;
+        let (position, dir) = (vector(&found.position, first), vector(&meetings.to_light, first));
+        let org = each(|axis| dir[axis].mul_add(S::Wide::constant(TOLERANCE), position[axis]));
+        probes.push(first, facing, org, dir);
     }
     probes.close();
 }
@@ -102,17 +112,16 @@ fn aim<S: Real>(lamp: &Lamp, found: &Found<S>, meetings: &Meetings<S>, probes: &
 /// Source of the highlight: Christophe Schlick, "A Fast Alternative to Phong's Specular Model", Graphics Gems IV, 1994.
 fn light<S: Real>(lamp: &Lamp, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
     let zero = S::Wide::constant(0.0);
-    let Meetings { kinds, base, finish, color, visible } = meetings;
-    for (k, &kinds) in kinds.iter().enumerate().filter(|(_, kinds)| kinds.lit != 0) {
+    let Meetings { base, finish, color, to_light, facing, visible, .. } = meetings;
+    for (k, &facing) in facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
         let first = k * S::Wide::N;
         let visible = S::Wide::load(&visible[first..]);
-        let seen = zero.cmp_lt(visible).bits();
-        if kinds.lit & seen == 0 {
+        let lit = facing & zero.cmp_lt(visible).bits();
+        if lit == 0 {
             continue;
         }
-        let (to_light, lit) = towards(lamp, found, kinds, first);
-        let lit = lit & seen;
         let lit = <S::Wide as Lanes>::Mask::from_bits(lit);
+        let to_light = vector(to_light, first);
         let (normal, dir) = (vector(&found.normal, first), vector(&level.rays.dir, first));
         let cosine = dot(normal, to_light);
         let [shine, specular, diffuse] = vector(finish, first);
