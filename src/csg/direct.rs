@@ -6,7 +6,7 @@
 //!
 //! Source of the intervals: Roth, "Ray casting for modeling solids", 1982.
 
-use super::operands::{MOST, Operands};
+use super::operands::Operands;
 use super::solid::{Search, Solid};
 use super::sweep::{Boundary, Effort};
 use super::tree::{Gate, LeafPlace, Tree};
@@ -99,7 +99,7 @@ pub(super) fn first<V: Lanes>(
         None => operands.of_all(solid, operation, &part, eps),
         Some(search) => operands.of_met(solid, operation, &part, eps, search),
     };
-    if operands.count > MOST || lanes == 0 {
+    if operands.is_overfull() || lanes == 0 {
         return (effort, lanes);
     }
     let count = operands.count;

@@ -67,9 +67,9 @@ impl<S: Real> Operands<S> {
             }
             if operand.is_needed {
                 lanes = met;
-                if lanes == 0 {
-                    break;
-                }
+            }
+            if lanes == 0 || self.is_overfull() {
+                break;
             }
         }
         (effort, lanes)
@@ -97,10 +97,10 @@ impl<S: Real> Operands<S> {
         for met in search.met.iter().filter(|met| is_needed(met)) {
             let within = search.intervals.get::<V>(met.at);
             lanes &= self.add(solid, operation, packet, (met.leaf, met.lanes & lanes), (&within, eps));
-            if lanes == 0 {
-                return (effort, 0);
+            if lanes == 0 || self.is_overfull() {
+                return (effort, lanes);
             }
-            let [begin, end, ..] = &self.spans[(self.count - 1).min(MOST)];
+            let [begin, end, ..] = &self.spans[self.count - 1];
             (place, last) = (place.fast_max(V::load(begin)), last.fast_min(V::load(end)));
             needed += 1;
         }
@@ -121,8 +121,11 @@ impl<S: Real> Operands<S> {
                         continue;
                     }
                     self.see(solid, operation, packet, met, (&within, eps));
+                    if self.is_overfull() {
+                        return (effort, lanes);
+                    }
                 }
-                if met.operand < self.count.min(MOST) as u32 {
+                if met.operand < self.count as u32 {
                     let [begin, end, ..] = &self.spans[met.operand as usize];
                     let end = V::load(end);
                     let inside = V::load(begin).cmp_le(place) & place.cmp_lt(end);
@@ -138,8 +141,17 @@ impl<S: Real> Operands<S> {
         for met in search.met.iter_mut().filter(|met| met.operand == Met::UNSEEN && met.lanes & free != 0) {
             let within = search.intervals.get::<V>(met.at);
             self.see(solid, operation, packet, met, (&within, eps));
+            if self.is_overfull() {
+                break;
+            }
         }
         (effort, lanes)
+    }
+
+    /// Whether there are more operands than there is room for: the last one is not kept.
+    #[inline(always)]
+    pub fn is_overfull(&self) -> bool {
+        self.count > MOST
     }
 
     /// Adds where lanes are inside of a leaf that a search has found, and notes its number.
