@@ -153,3 +153,85 @@ impl<S: Real> Bundle<S> {
 fn is_mixed<S: Real>((low, high): (S, S)) -> bool {
     (low < S::ZERO) != (high < S::ZERO)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::Child;
+    use crate::lanes::{f32x8, f64x4};
+    use crate::math::Aabb;
+
+    /// Numbers from -1 to 1, always the same (splitmix64; Steele, Lea, Flood, 2014).
+    struct Random(u64);
+
+    impl Random {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = self.0;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        }
+    }
+
+    /// Packets around one direction, most of them on both sides of an axis or two: no box that a lane meets is rejected or begins
+    /// later than there, and many others are.
+    fn check<V: Lanes>(seed: u64) {
+        let mut r = Random(seed);
+        let (mut met, mut rejected, mut mixed) = (0, 0, 0);
+        for round in 0..4000 {
+            let mut node = Node::<V::Scalar>::empty();
+            for _ in 0..WIDTH {
+                let corner = [0; 3].map(|_| 3.0 * r.next());
+                let size = [0; 3].map(|_| 0.5 * r.next().abs());
+                let [lo, hi] = [0.0, 1.0].map(|k| each(|a| V::Scalar::from_f64(corner[a] + k * size[a])));
+                node.push(&Aabb { lo, hi }, Child::ROOT);
+            }
+            // Some exactly along an axis, some from the planes of faces.
+            let middle = [0; 3].map(|_| (3.0 * r.next()).round());
+            let from = if round % 3 == 0 { node.child_bounds(0).lo } else { [V::Scalar::ZERO; 3] };
+            let mut lines = [[[V::Scalar::ZERO; 32]; 3]; 2];
+            for lane in 0..V::N {
+                for axis in 0..3 {
+                    lines[0][axis][lane] = from[axis] + V::Scalar::from_f64(0.2 * r.next() * f64::from(round % 2));
+                    lines[1][axis][lane] = V::Scalar::from_f64(middle[axis] + 0.6 * r.next());
+                }
+            }
+            let [org, dir] = lines.map(|line| map3(line, |x| V::load(&x)));
+            let t_min = if round % 5 == 0 { -0.5 } else { 0.0 };
+            let packet = Packet::<V>::unsheared(org, dir, V::constant(t_min));
+            let t_max = V::constant(2.0);
+            let bundles = [
+                Bundle::of(&packet, V::ALL, t_max),
+                Bundle::spanning(
+                    map3(org, |x| x.range(V::ALL)),
+                    map3(dir, |x| x.range(V::ALL)),
+                    packet.t_min.lane(0),
+                    t_max.lane(0),
+                ),
+            ];
+            for bundle in bundles {
+                let mut near = [V::Scalar::ZERO; WIDTH];
+                let some = bundle.children::<V>(&node, &mut near);
+                mixed += usize::from(!bundle.is_uniform());
+                for slot in 0..WIDTH {
+                    let bounds = node.child_bounds(slot);
+                    let interval = Interval::of(&packet, bounds.lo, bounds.hi);
+                    let lanes = interval.meets(packet.t_min, t_max).bits();
+                    rejected += usize::from(some >> slot & 1 == 0);
+                    for lane in (0..V::N).filter(|lane| lanes >> lane & 1 != 0) {
+                        met += 1;
+                        assert!(some >> slot & 1 != 0 && near[slot] <= interval.near.lane(lane), "{round}, {packet:?}");
+                    }
+                }
+            }
+        }
+        assert!(met > 5000 && rejected > 30_000 && mixed > 3000, "{met} met, {rejected} rejected, {mixed} mixed");
+    }
+
+    #[test]
+    fn bundles_reject_no_box_that_a_lane_meets() {
+        check::<f32x8>(1);
+        check::<f64x4>(2);
+    }
+}

@@ -145,7 +145,7 @@ impl<S: Real> Job<'_, S> {
         }
     }
 
-    /// Traces vectors of rays by one list of leaves; false if that is too long.
+    /// Traces vectors of rays by one list of leaves; false if that is too long, or if they look into several octants.
     fn whole<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
         let bounds = Bounds::<V>::of(self.rays, starts);
         if bounds.live == 0 {
