@@ -221,12 +221,14 @@ mod tests {
                     rejected += usize::from(some >> slot & 1 == 0);
                     for lane in (0..V::N).filter(|lane| lanes >> lane & 1 != 0) {
                         met += 1;
-                        assert!(some >> slot & 1 != 0 && near[slot] <= interval.near.lane(lane), "{round}, {packet:?}");
+                        // Before its start a lane does not enter.
+                        let enters = interval.near.lane(lane).fast_max(packet.t_min.lane(lane));
+                        assert!(some >> slot & 1 != 0 && near[slot] <= enters, "{round}, {packet:?}");
                     }
                 }
             }
         }
-        assert!(met > 5000 && rejected > 30_000 && mixed > 3000, "{met} met, {rejected} rejected, {mixed} mixed");
+        assert!(met > 5000 && rejected > 30_000 && mixed > 2500, "{met} met, {rejected} rejected, {mixed} mixed");
     }
 
     #[test]
