@@ -90,7 +90,8 @@ impl<S: Real> Bundle<S> {
         self.reach = t.range(self.lanes).1;
     }
 
-    /// Children that some lane may meet (a superset; exact for one ray), and where the first enters.
+    /// Children that some lane may meet (a superset; exact for one ray), and where the first enters, or some
+    /// place before its start.
     #[inline(always)]
     pub fn children<V: Lanes<Scalar = S>>(&self, node: &Node<S>, near: &mut [S; WIDTH]) -> u32 {
         let one_ray = V::N == 1;

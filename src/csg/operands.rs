@@ -9,7 +9,7 @@ use crate::ray::Packet;
 use crate::ray::slab::Interval;
 use crate::shape::Span;
 
-/// Most operands that a packet may meet (tried: 4 to 24).
+/// Most operands that a packet may meet.
 pub(super) const MOST: usize = 16;
 
 /// Where lanes are inside of operands, what they are asked for, and where they first cross a surface. In memory: whatever the
