@@ -3,7 +3,7 @@
 //! Source of the boxes: Cameron, "Efficient bounds in constructive solid geometry", IEEE CG&A 11(3), 1991 (S-bounds).
 
 use super::direct::Operation;
-use super::leaf::{Leaf, LeafInput, Stores};
+use super::leaf::{Kind, Leaf, LeafInput, Stores};
 use super::solid::{LINEAR, Solid};
 use super::tree::{Gate, Node, Token, Tree};
 use crate::bvh::{self, BuildSettings, Preset};
@@ -253,7 +253,9 @@ impl<S: Real> Solid<S> {
         self.is_sole = leaf_is_all && self.leaves[0].clip == self.bounds;
         self.is_span = self.is_sole && self.leaves[0].kind.is_span();
         self.front = self.front_share();
-        if self.leaves.iter().all(|leaf| leaf.kind.is_span()) {
+        // In trees places are looked at one by one, so lines must pass through leaves at most once.
+        let listed = |kind: Kind| kind.is_span() || self.search.is_none() && !matches!(kind, Kind::Mesh(_));
+        if self.leaves.iter().all(|leaf| listed(leaf.kind)) {
             let operation = Operation::of(&self.tree, |leaf| self.leaves[leaf].clip == self.bounds);
             self.operation = operation.map(Box::new);
         }

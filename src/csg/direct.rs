@@ -1,8 +1,8 @@
-//! The first boundary of one operation over leaves that lines pass through at most once, straight from where they enter and
-//! leave them: a block less its holes is most of what models are made of.
+//! The first boundary of one operation, straight from where lines enter and leave the leaves: a block less its holes is most of
+//! what models are made of.
 //!
 //! A union is the outside of what is outside of all operands, so one rule does for both: inside of all operands, of which
-//! some count as their outside. Where two boundaries of a lane lie together this is not enough, and the lane is swept.
+//! some count as their outside.
 //!
 //! Source of the intervals: Roth, "Ray casting for modeling solids", 1982.
 
@@ -14,7 +14,7 @@ use crate::lanes::{Lanes, Real};
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
 
-/// A solid that is one operation.
+/// A solid that is one operation. Of its leaves none is a mesh; where they are searched lines pass through them at most once.
 #[derive(Clone, Debug)]
 pub(super) struct Operation {
     is_union: bool,
@@ -82,8 +82,9 @@ impl<V: Lanes> Part<'_, V> {
     }
 }
 
-/// Reports the first boundary of a part of `solid`, which is `operation`, to `found`; see [`super::sweep`]. Returns the lanes for
-/// which that is not enough. Its leaves are searched if `search` is given, else they are few.
+/// Reports the first boundary of a part of `solid`, which is `operation`, to `found`; see [`super::sweep`]. Returns the lanes that
+/// are to be swept instead: in which boundaries of several leaves that lie together are the first, or, in a search, any near it.
+/// Its leaves are searched if `search` is given, else they are few.
 #[inline(always)]
 pub(super) fn first<V: Lanes>(
     solid: &Solid<V::Scalar>,
@@ -95,6 +96,7 @@ pub(super) fn first<V: Lanes>(
 ) -> (Effort, u32) {
     let eps = solid.tolerance(part.packet);
     operands.count = 0;
+    let is_complete = search.is_none();
     let (mut effort, lanes) = match search {
         None => operands.of_all(solid, operation, &part, eps),
         Some(search) => operands.of_met(solid, operation, &part, eps, search),
@@ -107,7 +109,7 @@ pub(super) fn first<V: Lanes>(
     part.earliest().store(&mut operands.earliest);
     part.limit.store(&mut operands.limit);
     eps.store(&mut operands.eps);
-    operands.find(lanes);
+    operands.find(lanes, is_complete);
     let (t, face) = (V::load(&operands.t), V::load(&operands.face));
     let enters = if operation.is_union { operands.leaving } else { !operands.leaving };
     for i in 0..count {

@@ -188,12 +188,18 @@ impl<S: Real> Leaf<S> {
             return;
         }
         // One call for all with a single span, apart from the others': it is large, and the compiler left it out of line.
-        if let Some(span) = self.span(packet, stores) {
-            return events.push_span(slot, lanes, &span, within);
+        match self.span(packet, stores) {
+            Some(span) => events.push_span(slot, lanes, &span, within),
+            None => self.spans(packet, |span| events.push_span(slot, lanes, &span, within)),
         }
+    }
+
+    /// Calls `push` with where lines are inside, first to last, if this leaf is of a kind that lines pass through more than once
+    /// and no mesh.
+    #[inline(always)]
+    pub fn spans<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>, push: impl FnMut(Span<V>)) {
         let (o, d) = self.local(packet);
         let [p0, p1, p2, _] = self.params;
-        let push = |span| events.push_span(slot, lanes, &span, within);
         match self.kind {
             Kind::Round => shape::quadric::round(o, d, [p0, p1, p2], push),
             Kind::Trough => shape::quadric::trough(o, d, [p0, p1, p2], push),

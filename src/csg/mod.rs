@@ -14,6 +14,7 @@ mod operands;
 mod prune;
 mod solid;
 mod sweep;
+mod together;
 mod tree;
 
 pub use build::{Built, Input, build};

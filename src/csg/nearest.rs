@@ -28,8 +28,9 @@ impl<V: Lanes> Place<V> {
 
 impl<S: Real> Operands<S> {
     /// Finds the first boundary in each of `lanes` of what is inside of all operands, some of which count as their outside.
+    /// `is_complete`: whether all operands are listed that the lines meet.
     #[inline(never)]
-    pub fn find(&mut self, lanes: u32) {
+    pub fn find(&mut self, lanes: u32, is_complete: bool) {
         (self.of, self.leaving, self.together) = ([0; MOST], 0, 0);
         for first in (0..MAX_LANES).step_by(S::Wide::N) {
             let here = lanes >> first & S::Wide::ALL;
@@ -42,6 +43,9 @@ impl<S: Real> Operands<S> {
                 2 => self.find_from::<2>(first, here),
                 3 => self.find_from::<3>(first, here),
                 _ => self.find_from::<0>(first, here),
+            }
+            if is_complete && self.together >> first & here != 0 {
+                self.tell(first);
             }
         }
     }
@@ -111,10 +115,11 @@ impl<S: Real> Operands<S> {
         let crosses = leaves | (counts(start.t) & start.t.cmp_lt(last.t));
         let crosses = crosses & found.t.cmp_le(limit);
         let apart = eps + eps;
-        let together = match N {
-            0 => (crosses & self.is_crowded(first, found.t, apart)) | self.begins_at(first, earliest, apart),
-            _ => self.has_neighbours::<N>(first, apart),
-        };
+        let mut together = if N == 0 { !none } else { self.has_neighbours::<N>(first, apart) };
+        if together.bits() & lanes != 0 {
+            let matters = (crosses & self.is_crowded(first, found.t, apart)) | self.begins_at(first, earliest, apart);
+            together = together & matters;
+        }
         let together = together.bits() & lanes;
         let lanes = crosses.bits() & lanes & !together;
         found.t.store(&mut self.t[first..]);

@@ -182,26 +182,29 @@ impl<S: Real> Operands<S> {
         if lanes == 0 {
             return 0;
         }
-        let at = self.count.min(MOST);
-        let hit = solid.operand(packet, leaf, lanes, within, &mut self.spans[at]);
-        self.leaves[at] = leaf;
-        self.outside[at] = !operation.operands[leaf as usize].is_needed;
-        self.count += usize::from(hit != 0);
+        let outside = !operation.operands[leaf as usize].is_needed;
+        // Two calls: the registers of one would be those of both.
+        match solid.leaves[leaf as usize].kind.is_span() {
+            true => solid.span_of(packet, (leaf, outside), lanes, within, self),
+            false => solid.spans_of(packet, (leaf, outside), lanes, within, self),
+        }
+    }
+
+    /// Adds a span of a leaf; the lanes that have it. `outside`: whether it counts as its outside.
+    #[inline(always)]
+    pub fn push<V: Lanes<Scalar = S>>(&mut self, span: &Span<V>, leaf: u32, outside: bool) -> u32 {
+        let hit = span.hit.bits();
+        if hit != 0 {
+            let at = self.count.min(MOST);
+            let never = V::splat(S::INFINITY);
+            let [begin, end, face_in, face_out] = &mut self.spans[at];
+            V::select(span.hit, span.t_in, never).store(begin);
+            V::select(span.hit, span.t_out, never).store(end);
+            span.face_in.store(face_in);
+            span.face_out.store(face_out);
+            (self.leaves[at], self.outside[at]) = (leaf, outside);
+            self.count += 1;
+        }
         hit
     }
-}
-
-/// Writes where lines are inside of an operand: entry, exit, and their faces. Returns the lanes that are at all.
-#[inline(always)]
-pub(super) fn write<V: Lanes>(span: &Span<V>, to: &mut [[V::Scalar; MAX_LANES]; 4]) -> u32 {
-    let hit = span.hit.bits();
-    if hit != 0 {
-        let never = V::splat(V::Scalar::INFINITY);
-        let [begin, end, face_in, face_out] = to;
-        V::select(span.hit, span.t_in, never).store(begin);
-        V::select(span.hit, span.t_out, never).store(end);
-        span.face_in.store(face_in);
-        span.face_out.store(face_out);
-    }
-    hit
 }

@@ -4,11 +4,11 @@ use super::direct::Operation;
 use super::events::{Events, settled};
 use super::leaf::{Leaf, Stores};
 use super::mesh::Crossings;
-use super::operands;
+use super::operands::Operands;
 use super::prune::Met;
 use super::tree::Tree;
 use crate::bvh::{self, Bundle};
-use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
+use crate::lanes::{LaneMask, Lanes, Real};
 use crate::math::Aabb;
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
@@ -88,7 +88,7 @@ pub struct Solid<S> {
     pub(super) is_span: bool,
     /// Share of a line's way through it that is looked at first.
     pub(super) front: f64,
-    /// If it is one operation over leaves that lines pass through at most once.
+    /// If it is one operation, whose first boundary needs no sweep.
     pub(super) operation: Option<Box<Operation>>,
 }
 
@@ -246,19 +246,61 @@ impl<S: Real> Solid<S> {
         Some(Span { hit: span.hit & (span.t_in + eps).cmp_lt(span.t_out), ..span })
     }
 
-    /// Where lines `lanes`, which meet a leaf's box in `interval`, are inside of it, if it is of a kind that lines pass through at
-    /// most once: entry, exit and their faces to `to`. The lanes that are at all. `eps`: the tolerance.
+    /// Adds where lines `lanes`, which meet a leaf's box in `interval`, are inside of it to `operands`, if it is of a kind that
+    /// lines pass through at most once. The lanes that are at all. `eps`: the tolerance; `outside`: whether its outside is meant.
     #[inline(never)]
-    pub(super) fn operand<V: Lanes<Scalar = S>>(
+    pub(super) fn span_of<V: Lanes<Scalar = S>>(
         &self,
         packet: &Packet<V>,
-        leaf: u32,
+        (leaf, outside): (u32, bool),
         lanes: u32,
         (interval, eps): (&Interval<V>, V),
-        to: &mut [[S; MAX_LANES]; 4],
+        operands: &mut Operands<S>,
     ) -> u32 {
         let span = self.leaves[leaf as usize].span(packet, &self.stores);
-        span.map_or(0, |span| operands::write(&settled(&span, lanes, &widened(interval, eps)), to))
+        span.map_or(0, |span| operands.push(&settled(&span, lanes, &widened(interval, eps)), leaf, outside))
+    }
+
+    /// The same if it is of a kind that lines may pass through more than once, and no mesh. It is then outside of each of its
+    /// spans; or inside from the first to the last one, and outside of what is between them.
+    #[inline(never)]
+    pub(super) fn spans_of<V: Lanes<Scalar = S>>(
+        &self,
+        packet: &Packet<V>,
+        (leaf, outside): (u32, bool),
+        lanes: u32,
+        (interval, eps): (&Interval<V>, V),
+        operands: &mut Operands<S>,
+    ) -> u32 {
+        let within = widened(interval, eps);
+        let mut hit = 0;
+        let zero = V::constant(0.0);
+        let mut whole = Span { hit: V::Mask::from_bits(0), t_in: zero, t_out: zero, face_in: zero, face_out: zero };
+        self.leaves[leaf as usize].spans(packet, |span| {
+            let span = settled(&span, lanes, &within);
+            if outside {
+                hit |= operands.push(&span, leaf, true);
+                return;
+            }
+            let (before, after) = (whole, span);
+            let gap = Span {
+                hit: before.hit & after.hit,
+                t_in: before.t_out,
+                t_out: after.t_in,
+                face_in: before.face_out,
+                face_out: after.face_in,
+            };
+            operands.push(&gap, leaf, true);
+            let (first, last) = (|a: V, b: V| V::select(before.hit, a, b), |a: V, b: V| V::select(after.hit, b, a));
+            whole = Span {
+                hit: before.hit | after.hit,
+                t_in: first(before.t_in, after.t_in),
+                face_in: first(before.face_in, after.face_in),
+                t_out: last(before.t_out, after.t_out),
+                face_out: last(before.face_out, after.face_out),
+            };
+        });
+        hit | operands.push(&whole, leaf, false)
     }
 
     /// Adds the boundaries of a leaf whose box the lines meet in `interval`. `eps`: the tolerance.

@@ -30,15 +30,23 @@ impl Random {
 
 /// A leaf: often with faces in the planes of others.
 fn leaf(r: &mut Random, size: f64) -> LeafInput<'static> {
-    let form = [Form::Cuboid, Form::Sphere, Form::Cylinder, Form::Cone(0.5), Form::Cuboid][r.below(5)];
+    let convex = [Form::Cuboid, Form::Sphere, Form::Cylinder, Form::Cone(0.5), Form::Cuboid];
+    let others =
+        [Form::Torus(0.4), Form::EllipticTorus([0.5, 0.2]), Form::Round([0.1, -0.5, 1.0]), Form::Taper([0.5, 1.5])];
+    let form = if r.below(4) == 0 { others[r.below(4)] } else { convex[r.below(5)] };
     let snapped = r.below(2) == 0;
     let snap = |v: DVec3| if snapped { (v * 4.0).round() / 4.0 } else { v };
     let scale = snap(DVec3::splat(0.25) + r.cube().abs() * size).max(DVec3::splat(0.25));
     let turn =
         if snapped { DQuat::IDENTITY } else { DQuat::from_euler(glam::EulerRot::XYZ, r.number(), r.number(), 0.0) };
     let to_tree = DAffine3::from_scale_rotation_translation(scale, turn, snap(r.cube() * 1.5));
-    let lo = if matches!(form, Form::Cylinder | Form::Cone(_)) { DVec3::new(-1.0, -1.0, 0.0) } else { DVec3::NEG_ONE };
-    LeafInput { form, lo, hi: DVec3::ONE, to_tree }
+    let (lo, hi) = match form {
+        Form::Cylinder | Form::Cone(_) => (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE),
+        Form::Torus(_) | Form::EllipticTorus(_) => (DVec3::splat(-1.6), DVec3::splat(1.6)),
+        Form::Round(_) | Form::Taper(_) => (DVec3::new(-1.6, -1.6, 0.0), DVec3::new(1.6, 1.6, 1.0)),
+        _ => (DVec3::NEG_ONE, DVec3::ONE),
+    };
+    LeafInput { form, lo, hi, to_tree }
 }
 
 /// One operation over `count` leaves, each as it is or its outside.
@@ -57,6 +65,30 @@ fn solid<S: Real>(r: &mut Random, count: usize) -> Vec<Solid<S>> {
         }
     }
     program.push(Token::Op(op, count as u32));
+    build(&Input { leaves: &leaves, program: &program, tolerance: 0.0 }, Preset::Fast).solids
+}
+
+/// Groups of leaves, each one operation, in another one.
+fn nested<S: Real>(r: &mut Random, count: usize) -> Vec<Solid<S>> {
+    let mut leaves: Vec<_> = (0..count).map(|_| leaf(r, 1.5)).collect();
+    let ops = [Op::Union, Op::Intersection, Op::Difference];
+    let (mut program, mut in_group, mut groups) = (Vec::new(), 0, 0);
+    for i in 0..count {
+        // The first of a group is large.
+        if in_group == 0 {
+            leaves[i].to_tree.matrix3 *= 3.0;
+        }
+        program.push(Token::Leaf(i as u32));
+        in_group += 1;
+        if i + 1 == count || r.below(2) == 0 {
+            program.push(Token::Op(ops[r.below(3)], in_group));
+            (in_group, groups) = (0, groups + 1);
+        }
+    }
+    program.push(Token::Op(ops[r.below(3)], groups));
+    if r.below(4) == 0 {
+        program.push(Token::Op(Op::Complement, 1));
+    }
     build(&Input { leaves: &leaves, program: &program, tolerance: 0.0 }, Preset::Fast).solids
 }
 
@@ -115,9 +147,10 @@ fn packet<V: Lanes>(r: &mut Random) -> (Packet<V>, V) {
 fn check<V: Lanes>(seed: u64) {
     let mut r = Random(seed);
     let (mut hits, mut direct) = (0, 0);
-    for round in 0..600 {
-        let count = [2, 2, 3, 4, 7, 40][round % 6];
-        for solid in solid::<V::Scalar>(&mut r, count) {
+    for round in 0..3600 {
+        let count = [2, 2, 3, 4, 7, 40, 4, 6, 9][round % 9];
+        let solids = if round % 9 < 6 { solid::<V::Scalar>(&mut r, count) } else { nested(&mut r, count) };
+        for solid in solids {
             for _ in 0..20 {
                 let (packet, limit) = packet::<V>(&mut r);
                 let live = if r.below(2) == 0 { V::ALL } else { r.below(1 << V::N) as u32 };

@@ -130,6 +130,11 @@ impl Tree {
                 }
                 Token::Op(op, _) => op,
             };
+            if op != Op::Complement && list.len() == 1 {
+                // Groups of one: nothing but that.
+                open.push(Open { token: list[0], negated, parent });
+                continue;
+            }
             if op == Op::Complement {
                 open.extend(list.iter().map(|&token| Open { token, negated: !negated, parent }));
                 continue;
