@@ -160,20 +160,7 @@ mod tests {
     use super::*;
     use crate::bvh::Child;
     use crate::lanes::{f32x8, f64x4};
-    use crate::math::Aabb;
-
-    /// Numbers from -1 to 1, always the same (splitmix64; Steele, Lea, Flood, 2014).
-    struct Random(u64);
-
-    impl Random {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = self.0;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-    }
+    use crate::math::{Aabb, Random};
 
     /// Packets around one direction, most of them on both sides of an axis or two: no box that a lane meets is rejected or begins
     /// later than there, and many others are.
@@ -183,19 +170,19 @@ mod tests {
         for round in 0..4000 {
             let mut node = Node::<V::Scalar>::empty();
             for _ in 0..WIDTH {
-                let corner = [0; 3].map(|_| 3.0 * r.next());
-                let size = [0; 3].map(|_| 0.5 * r.next().abs());
+                let corner = [0; 3].map(|_| 3.0 * r.signed());
+                let size = [0; 3].map(|_| 0.5 * r.signed().abs());
                 let [lo, hi] = [0.0, 1.0].map(|k| each(|a| V::Scalar::from_f64(corner[a] + k * size[a])));
                 node.push(&Aabb { lo, hi }, Child::ROOT);
             }
             // Some exactly along an axis, some from the planes of faces.
-            let middle = [0; 3].map(|_| (3.0 * r.next()).round());
+            let middle = [0; 3].map(|_| (3.0 * r.signed()).round());
             let from = if round % 3 == 0 { node.child_bounds(0).lo } else { [V::Scalar::ZERO; 3] };
             let mut lines = [[[V::Scalar::ZERO; 32]; 3]; 2];
             for lane in 0..V::N {
                 for axis in 0..3 {
-                    lines[0][axis][lane] = from[axis] + V::Scalar::from_f64(0.2 * r.next() * f64::from(round % 2));
-                    lines[1][axis][lane] = V::Scalar::from_f64(middle[axis] + 0.6 * r.next());
+                    lines[0][axis][lane] = from[axis] + V::Scalar::from_f64(0.2 * r.signed() * f64::from(round % 2));
+                    lines[1][axis][lane] = V::Scalar::from_f64(middle[axis] + 0.6 * r.signed());
                 }
             }
             let [org, dir] = lines.map(|line| map3(line, |x| V::load(&x)));

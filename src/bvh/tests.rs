@@ -4,27 +4,14 @@ use super::cost::Cost;
 use super::refine::{Place, Refined};
 use super::topdown::{self, Part, Rules, Span};
 use super::*;
-use crate::math::Aabb;
-
-/// A small deterministic generator (splitmix64; Steele, Lea, Flood, 2014) so that tests need no crate.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
+use crate::math::{Aabb, Random};
 
 fn soup(n: usize, seed: u64) -> Vec<Aabb<f32>> {
     let mut r = Random(seed);
     (0..n)
         .map(|_| {
-            let lo = [0; 3].map(|_| r.next() as f32);
-            Aabb { lo, hi: lo.map(|x| x + 0.05 * r.next() as f32) }
+            let lo = [0; 3].map(|_| r.unit() as f32);
+            Aabb { lo, hi: lo.map(|x| x + 0.05 * r.unit() as f32) }
         })
         .collect()
 }
@@ -294,7 +281,7 @@ fn refinement_moves_subtrees_to_where_they_cost_less() {
     // Long thin boxes in all directions: what splits by planes are worst at.
     let boxes: Vec<_> = (0..4000)
         .map(|_| {
-            let (lo, size) = ([0; 3].map(|_| r.next() as f32), [0; 3].map(|_| r.next().powi(6) as f32));
+            let (lo, size) = ([0; 3].map(|_| r.unit() as f32), [0; 3].map(|_| r.unit().powi(6) as f32));
             Aabb { lo, hi: [0, 1, 2].map(|i| lo[i] + size[i]) }
         })
         .collect();

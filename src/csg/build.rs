@@ -234,7 +234,6 @@ impl<S: Real> Solid<S> {
             search: None,
             always: Vec::new(),
             is_sole: false,
-            is_span: false,
             front: 1.0,
             operation: None,
         }
@@ -251,7 +250,6 @@ impl<S: Real> Solid<S> {
         self.index(preset);
         let leaf_is_all = self.tree.nodes.len() == 1 && self.leaves.len() == 1 && !self.tree.leaves[0].negated;
         self.is_sole = leaf_is_all && self.leaves[0].clip == self.bounds;
-        self.is_span = self.is_sole && self.leaves[0].kind.is_span();
         self.front = self.front_share();
         // In trees places are looked at one by one, so lines must pass through leaves at most once.
         let listed = |kind: Kind| kind.is_span() || self.search.is_none() && !matches!(kind, Kind::Mesh(_));

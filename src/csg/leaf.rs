@@ -99,12 +99,13 @@ impl Kind {
 
 /// A compiled leaf.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub(super) struct Leaf<S> {
-    pub(super) kind: Kind,
-    pub(super) to_local: Affine<S>,
-    pub(super) params: [S; 4],
     /// Where it can make a difference: its box, cut by those of the operations above it.
     pub clip: Aabb<S>,
+    pub(super) params: [S; 4],
+    pub(super) kind: Kind,
+    pub(super) to_local: Affine<S>,
 }
 
 /// What leaves of unequal size keep outside of their records.

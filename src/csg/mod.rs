@@ -12,6 +12,7 @@ mod mesh;
 mod nearest;
 mod operands;
 mod prune;
+mod sole;
 mod solid;
 mod sweep;
 mod together;
@@ -19,6 +20,7 @@ mod tree;
 
 pub use build::{Built, Input, build};
 pub use leaf::{Form, LeafInput, Triangles};
+pub use sole::Sole;
 pub use solid::Solid;
 pub use sweep::{Boundary, Depth, Effort, Scratch, sweep};
 pub use tree::{Op, Token};

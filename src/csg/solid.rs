@@ -84,8 +84,6 @@ pub struct Solid<S> {
     pub(super) always: Vec<u32>,
     /// Whether it is its only leaf, box and all.
     pub(super) is_sole: bool,
-    /// Whether it is and lines pass through that leaf at most once.
-    pub(super) is_span: bool,
     /// Share of a line's way through it that is looked at first.
     pub(super) front: f64,
     /// If it is one operation, whose first boundary needs no sweep.
@@ -125,12 +123,7 @@ impl<S: Real> Solid<S> {
     /// Difference of t below which two boundaries of a lane are one. It depends on the lane's line only.
     #[inline(always)]
     pub(super) fn tolerance<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>) -> V {
-        let largest = |v: [V; 3]| v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs());
-        let reach = largest(packet.org) + V::splat(self.size);
-        let distance = (reach * V::constant(ROUNDINGS * S::EPSILON.to_f64())).fast_max(V::splat(self.least));
-        // One over the largest component of the direction.
-        let [x, y, z] = packet.rcp.map(V::abs);
-        distance * x.fast_min(y).fast_min(z)
+        tolerance(packet, self.size, self.least)
     }
 
     /// Share of a line's way through the solid that is looked at first: a few layers of leaves, were they spread evenly.
@@ -225,27 +218,6 @@ impl<S: Real> Solid<S> {
         }
     }
 
-    /// Whether it is its only leaf and lines pass through that at most once.
-    #[inline(always)]
-    pub fn is_span(&self) -> bool {
-        self.is_span
-    }
-
-    /// Where lines `lanes`, which meet its box in `interval`, are inside of a solid that [`Self::is_span`]; lines that only touch
-    /// it are not, as for the sweep. `None` for other solids.
-    #[inline(always)]
-    pub fn span<V: Lanes<Scalar = S>>(
-        &self,
-        packet: &Packet<V>,
-        lanes: u32,
-        interval: &Interval<V>,
-    ) -> Option<Span<V>> {
-        let span = self.leaves[0].span(packet, &self.stores)?;
-        let eps = self.tolerance(packet);
-        let span = settled(&span, lanes, &widened(interval, eps));
-        Some(Span { hit: span.hit & (span.t_in + eps).cmp_lt(span.t_out), ..span })
-    }
-
     /// Adds where lines `lanes`, which meet a leaf's box in `interval`, are inside of it to `operands`, if it is of a kind that
     /// lines pass through at most once. The lanes that are at all. `eps`: the tolerance; `outside`: whether its outside is meant.
     #[inline(never)]
@@ -320,9 +292,20 @@ impl<S: Real> Solid<S> {
     }
 }
 
+/// Difference of t below which two boundaries of a lane are one, for a solid of this `size` and `least` distance.
+#[inline(always)]
+pub(super) fn tolerance<V: Lanes>(packet: &Packet<V>, size: V::Scalar, least: V::Scalar) -> V {
+    let largest = |v: [V; 3]| v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs());
+    let reach = largest(packet.org) + V::splat(size);
+    let distance = (reach * V::constant(ROUNDINGS * V::Scalar::EPSILON.to_f64())).fast_max(V::splat(least));
+    // One over the largest component of the direction.
+    let [x, y, z] = packet.rcp.map(V::abs);
+    distance * x.fast_min(y).fast_min(z)
+}
+
 /// Where boundaries of a leaf may lie whose box is met in `interval`.
 #[inline(always)]
-fn widened<V: Lanes>(interval: &Interval<V>, eps: V) -> Interval<V> {
+pub(super) fn widened<V: Lanes>(interval: &Interval<V>, eps: V) -> Interval<V> {
     let slack = eps + eps;
     Interval { near: interval.near - slack, far: interval.far + slack }
 }

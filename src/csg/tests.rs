@@ -5,28 +5,9 @@ use glam::{DAffine3, DQuat, DVec3};
 use super::*;
 use crate::bvh::Preset;
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Pair, Real, f32x4, f32x16, f64x8};
+use crate::math::Random;
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
-
-/// Numbers from 0 to 1, always the same: Marsaglia, "Xorshift RNGs", 2003.
-struct Random(u64);
-
-impl Random {
-    fn number(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn cube(&mut self) -> DVec3 {
-        DVec3::new(self.number(), self.number(), self.number()) * 2.0 - 1.0
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.number() * end as f64) as usize
-    }
-}
 
 /// A leaf: often with faces in the planes of others.
 fn leaf(r: &mut Random, size: f64) -> LeafInput<'static> {
@@ -37,8 +18,7 @@ fn leaf(r: &mut Random, size: f64) -> LeafInput<'static> {
     let snapped = r.below(2) == 0;
     let snap = |v: DVec3| if snapped { (v * 4.0).round() / 4.0 } else { v };
     let scale = snap(DVec3::splat(0.25) + r.cube().abs() * size).max(DVec3::splat(0.25));
-    let turn =
-        if snapped { DQuat::IDENTITY } else { DQuat::from_euler(glam::EulerRot::XYZ, r.number(), r.number(), 0.0) };
+    let turn = if snapped { DQuat::IDENTITY } else { DQuat::from_euler(glam::EulerRot::XYZ, r.unit(), r.unit(), 0.0) };
     let to_tree = DAffine3::from_scale_rotation_translation(scale, turn, snap(r.cube() * 1.5));
     let (lo, hi) = match form {
         Form::Cylinder | Form::Cone(_) => (DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE),
@@ -132,7 +112,7 @@ fn packet<V: Lanes>(r: &mut Random) -> (Packet<V>, V) {
     for lane in 0..V::N {
         let (o, d) = match kind {
             0 => (base, towards + r.cube() * 0.3),
-            1 => ((r.cube() * 8.0).round() / 4.0 - along * 4.0 * r.number().round(), along),
+            1 => ((r.cube() * 8.0).round() / 4.0 - along * 4.0 * r.unit().round(), along),
             _ => (r.cube() * 2.0, r.cube()),
         };
         for axis in 0..3 {
@@ -172,4 +152,21 @@ fn first_boundaries_are_those_of_the_sweep() {
     check::<f64x8>(3);
     check::<Pair<f64x8>>(4);
     check::<f64>(5);
+}
+
+#[test]
+fn groups_of_one_are_what_they_hold() {
+    for group in [Op::Union, Op::Intersection, Op::Difference, Op::Xor] {
+        for complements in 0..3 {
+            let mut program = vec![Token::Leaf(0), Token::Leaf(1)];
+            for _ in 0..complements {
+                program.extend([Token::Op(group, 1), Token::Op(Op::Complement, 1)]);
+            }
+            program.extend([Token::Op(group, 1), Token::Op(Op::Intersection, 2)]);
+            let tree = tree::Tree::new(&program, 2);
+            assert_eq!(tree.nodes.len(), 1, "{program:?}");
+            let negated: Vec<bool> = tree.leaves.iter().map(|leaf| leaf.negated).collect();
+            assert_eq!(negated, [false, complements == 1], "{program:?}");
+        }
+    }
 }

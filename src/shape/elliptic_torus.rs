@@ -69,20 +69,7 @@ pub fn elliptic_torus_normal(point: DVec3, [reach, lean]: [f64; 2]) -> DVec3 {
 mod tests {
     use super::*;
     use crate::lanes::{LaneMask, Real, f32x8, f64x4};
-
-    /// Numbers below 1 in magnitude, different in every call.
-    struct Random(u64);
-
-    impl Random {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-
-        fn vector(&mut self) -> DVec3 {
-            DVec3::new(self.next(), self.next(), self.next())
-        }
-    }
+    use crate::math::Random;
 
     /// A point of the surface by the angles about the axis and in the ellipse, whose semi-axes lie on the diagonals.
     fn surface([reach, lean]: [f64; 2], about: f64, within: f64) -> DVec3 {
@@ -113,9 +100,9 @@ mod tests {
         let mut r = Random(1);
         let mut met = 0;
         for _ in 0..20_000 {
-            let numbers = [0.05 + 0.9 * r.next().abs(), 0.95 * r.next()];
-            let (p, d) = (surface(numbers, 4.0 * r.next(), 4.0 * r.next()), r.vector());
-            let at = 10.0 * r.next();
+            let numbers = [0.05 + 0.9 * r.signed().abs(), 0.95 * r.signed()];
+            let (p, d) = (surface(numbers, 4.0 * r.signed(), 4.0 * r.signed()), r.cube());
+            let at = 10.0 * r.signed();
             let found = spans::<f64>(numbers, p - at * d, d);
             let n = elliptic_torus_normal(p, numbers).normalize();
             assert!(form(numbers, p + 1e-6 * n) > 0.0 && form(numbers, p - 1e-6 * n) < 0.0, "{numbers:?} {p} {n}");
@@ -138,10 +125,10 @@ mod tests {
         let mut r = Random(2);
         let mut counts = [0; 3];
         for _ in 0..20_000 {
-            let numbers = [0.1 + 0.9 * r.next().abs(), 0.9 * r.next()];
-            let p = surface(numbers, 4.0 * r.next(), 4.0 * r.next());
+            let numbers = [0.1 + 0.9 * r.signed().abs(), 0.9 * r.signed()];
+            let p = surface(numbers, 4.0 * r.signed(), 4.0 * r.signed());
             let n = elliptic_torus_normal(p, numbers).normalize();
-            let d = n.cross(r.vector());
+            let d = n.cross(r.cube());
             if d.length() < 0.1 {
                 continue;
             }

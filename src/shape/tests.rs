@@ -10,6 +10,7 @@ use glam::{DAffine3, DVec3};
 
 use super::{Cone, Cuboid, Cylinder, Placed, PlacedRecord, Solid, Span, Sphere};
 use crate::lanes::{LaneMask, Lanes, Pair, Real, f32x4, f32x8, f32x16, f64x2, f64x4, f64x8};
+use crate::math::Random;
 use crate::ray::Packet;
 
 /// Origin and direction.
@@ -187,27 +188,5 @@ fn judge_nearest(piece: &Piece, slack: f64) {
             assert!(from == entry || entry.0 < slack, "passed over the entry: {piece:?}");
         }
         None => assert!(exit.0 < slack, "nothing found in {piece:?}"),
-    }
-}
-
-/// splitmix64, in [0, 1) (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// A point of the cube [-1, 1]^3.
-    fn cube(&mut self) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }
 }

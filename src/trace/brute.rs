@@ -5,7 +5,7 @@ use super::query::Query;
 use crate::bvh::Child;
 use crate::lanes::Lanes;
 use crate::ray::Packet;
-use crate::scene::world::{Class, Object, World};
+use crate::scene::world::{Class, Object, SolidBlock, World};
 use crate::shape::Block;
 
 /// Tests everything in the world.
@@ -42,7 +42,7 @@ fn blocks_by_class<S: crate::lanes::Real>(object: &Object<S>) -> impl Iterator<I
         let sizes = match class {
             Class::Triangle => object.triangles.iter().map(Block::len).collect(),
             Class::WorldSphere => object.spheres.iter().map(Block::len).collect(),
-            Class::Solids => object.solid_blocks.iter().map(Vec::len).collect(),
+            Class::Solids => object.solid_blocks.iter().map(SolidBlock::len).collect(),
             _ => object.placed[class as usize].iter().map(Block::len).collect(),
         };
         (class, sizes)

@@ -20,10 +20,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
 ) {
     let (at, count) = (leaf.index as usize, usize::from(leaf.count));
     if leaf.class == Class::Solids as u8 {
-        for &solid in &object.solid_blocks[at] {
-            solids::trace(&object.solids[solid as usize], inst, packet, query, lanes);
-        }
-        return;
+        return solids::block(object, &object.solid_blocks[at], inst, packet, query, lanes);
     }
     query.count_leaf(lanes, count);
     match Class::ALL[usize::from(leaf.class)] {
@@ -60,9 +57,7 @@ pub fn unbounded<V: Lanes, const ANY: bool, const COUNT: bool>(
         query.count_leaf(lanes, block.len());
         placed::<V, HalfSpace, ANY, COUNT>(block, block.len(), inst, packet, query, lanes);
     }
-    for &solid in &object.unbounded_solids {
-        solids::trace(&object.solids[solid as usize], inst, packet, query, lanes);
-    }
+    solids::block(object, &object.unbounded_solids, inst, packet, query, lanes);
 }
 
 /// Takes a packet into an instance: the lanes that meet the instance's box, and the packet in its space.

@@ -1,37 +1,43 @@
 //! Trees of solids against a packet: the nearest boundary at or after the segment's start.
 
+use std::ops::Range;
+
 use super::query::Query;
-use crate::csg::{self, Depth, Effort};
+use crate::csg::{self, Depth, Effort, Sole, Solid};
 use crate::lanes::{LaneMask, Lanes, Real};
+use crate::math::Aabb;
 use crate::ray::slab::Interval;
 use crate::ray::{Candidate, Packet};
-use crate::scene::world::PlacedSolid;
+use crate::scene::world::{Object, PlacedSolid, SolidBlock};
 
-/// Tests one solid.
+/// Tests the solids of a block.
 #[inline(always)]
-pub fn trace<V: Lanes, const ANY: bool, const COUNT: bool>(
-    placed: &PlacedSolid<V::Scalar>,
+pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
+    object: &Object<V::Scalar>,
+    block: &SolidBlock,
     inst: u32,
     packet: &Packet<V>,
     query: &mut Query<V, ANY, COUNT>,
     lanes: u32,
 ) {
+    let range = |of: &Range<u32>| of.start as usize..of.end as usize;
     // Two calls: the registers of one would be those of both.
-    match placed.solid.is_span() {
-        true => span(placed, inst, packet, query, lanes),
-        false => sweep(placed, inst, packet, query, lanes),
+    for sole in &object.soles[range(&block.soles)] {
+        span(sole, &object.solids[sole.solid as usize].solid, inst, packet, query, lanes);
+    }
+    for &solid in &object.swept[range(&block.swept)] {
+        sweep(&object.solids[solid as usize], inst, packet, query, lanes);
     }
 }
 
 /// Where the lines meet the solid's box, and the lanes that look for something there.
 #[inline(always)]
 fn enter<V: Lanes, const ANY: bool, const COUNT: bool>(
-    placed: &PlacedSolid<V::Scalar>,
+    bounds: &Aabb<V::Scalar>,
     packet: &Packet<V>,
     query: &Query<V, ANY, COUNT>,
     lanes: u32,
 ) -> (Interval<V>, u32) {
-    let bounds = &placed.solid.bounds;
     let interval = Interval::of(packet, bounds.lo, bounds.hi);
     let wanted = interval.meets(packet.t_min, query.hit.t).bits() & lanes;
     (interval, if ANY { wanted & !query.done } else { wanted })
@@ -46,7 +52,7 @@ fn sweep<V: Lanes, const ANY: bool, const COUNT: bool>(
     query: &mut Query<V, ANY, COUNT>,
     lanes: u32,
 ) {
-    let (interval, wanted) = enter(placed, packet, query, lanes);
+    let (interval, wanted) = enter(&placed.solid.bounds, packet, query, lanes);
     if wanted == 0 {
         return;
     }
@@ -71,17 +77,18 @@ fn sweep<V: Lanes, const ANY: bool, const COUNT: bool>(
 /// the same as a sweep over both.
 #[inline(never)]
 fn span<V: Lanes, const ANY: bool, const COUNT: bool>(
-    placed: &PlacedSolid<V::Scalar>,
+    sole: &Sole<V::Scalar>,
+    solid: &Solid<V::Scalar>,
     inst: u32,
     packet: &Packet<V>,
     query: &mut Query<V, ANY, COUNT>,
     lanes: u32,
 ) {
-    let (interval, wanted) = enter(placed, packet, query, lanes);
+    let (interval, wanted) = enter(sole.bounds(), packet, query, lanes);
     if wanted == 0 {
         return;
     }
-    let Some(span) = placed.solid.span(packet, wanted, &interval) else { return };
+    let Some(span) = sole.span(solid, packet, wanted, &interval) else { return };
     let boundary = |t: V, face: V| {
         let found = candidate(packet, &interval, t, face, 0);
         Candidate { hit: found.hit & t.cmp_le(query.hit.t), ..found }
@@ -94,7 +101,7 @@ fn span<V: Lanes, const ANY: bool, const COUNT: bool>(
         u: nearest(enters.u, leaves.u),
         v: enters.v,
     };
-    query.take(wanted, &found, placed.first_prim + placed.solid.number(0), inst);
+    query.take(wanted, &found, sole.prim, inst);
     if COUNT {
         let (events, steps) = if span.hit.any() { (2, 2) } else { (0, 0) };
         count(query, wanted, &Effort { met: 1, kept: 1, events, steps });

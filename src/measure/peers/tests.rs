@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use glam::{DAffine3, DVec3};
 
 use super::*;
+use crate::math::Random;
 use crate::measure::agreement::compare;
 use crate::measure::answers::Answers;
 use crate::scene::description::{Description, Group, Item, ItemKind};
@@ -12,29 +13,12 @@ use crate::scene::mesh::Mesh;
 use crate::scene::world::{Preset, World};
 use crate::trace::engine;
 
-/// splitmix64 (Steele, Lea, Flood, 2014), as numbers in [-1, 1).
-struct Random(u64);
-
-impl Random {
-    fn number(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-
-    fn point(&mut self) -> DVec3 {
-        DVec3::new(self.number(), self.number(), self.number())
-    }
-}
-
 /// 3000 triangles, once as they are and once turned, moved and scaled.
 fn soup() -> Description {
     let (mut random, mut mesh) = (Random(1), Mesh::default());
     for i in 0..3000 {
-        let centre = random.point() * 4.0;
-        mesh.positions.extend([0; 3].map(|_| (centre + random.point() * 0.4).as_vec3().as_dvec3()));
+        let centre = random.cube() * 4.0;
+        mesh.positions.extend([0; 3].map(|_| (centre + random.cube() * 0.4).as_vec3().as_dvec3()));
         mesh.triangles.push([0, 1, 2].map(|k| 3 * i + k));
     }
     let item = |kind, transform| Item { transform, material: None, kind };
@@ -67,7 +51,7 @@ fn rays() -> Vec<Rays<f32>> {
     let mut batch = |size: usize| {
         let mut rays = Rays::new(size);
         for i in (0..size).filter(|i| i % 7 != 3) {
-            let (org, target) = (random.point() * 9.0, random.point() * 3.0);
+            let (org, target) = (random.cube() * 9.0, random.cube() * 3.0);
             let end = if i % 3 == 0 { 0.7 } else { f32::INFINITY };
             rays.set(i, org.as_vec3().into(), (target - org).as_vec3().into(), 0.05, end);
         }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::facets::Facets;
 use super::rounding::Rounding;
 use super::runs::Runs;
-use super::{Class, Counts, Instance, Kinds, Object, PlacedSolid, World, solids, successor};
+use super::{Class, Counts, Instance, Kinds, Object, PlacedSolid, SolidBlock, World, solids, successor};
 use crate::bvh::{self, BuildSettings, LEAF_PRIMS, Leaf, Preset, Tree};
 use crate::error::Result;
 use crate::lanes::Real;
@@ -224,8 +224,11 @@ impl<S: Real> Primitives<S> {
             unbounded: Vec::new(),
             solids: std::mem::take(&mut self.solids),
             solid_blocks: Vec::new(),
-            unbounded_solids: std::mem::take(&mut self.unbounded_solids),
+            unbounded_solids: SolidBlock::default(),
+            soles: Vec::new(),
+            swept: Vec::new(),
         };
+        object.unbounded_solids = object.list_solids(self.unbounded_solids.drain(..));
         for leaf in &leaves {
             self.fill(&mut object, leaf);
         }
@@ -244,7 +247,14 @@ impl<S: Real> Primitives<S> {
         match Class::ALL[usize::from(leaf.class)] {
             Class::Triangle => object.triangles.push(Block::empty()),
             Class::WorldSphere => object.spheres.push(Block::empty()),
-            Class::Solids => object.solid_blocks.push(Vec::new()),
+            Class::Solids => {
+                let solids = leaf.prims.iter().filter_map(|&p| match self.records[p as usize] {
+                    Record::Solids(solid) => Some(solid),
+                    _ => None,
+                });
+                let block = object.list_solids(solids);
+                return object.solid_blocks.push(block);
+            }
             class => object.placed[class as usize].push(Block::empty()),
         }
         let at = leaf.block as usize;
@@ -254,9 +264,24 @@ impl<S: Real> Primitives<S> {
                 Record::Triangle(n) => object.triangles[at].set(i, n, id),
                 Record::Sphere(n) => object.spheres[at].set(i, n, id),
                 Record::Placed(class, n) => object.placed[class as usize][at].set(i, n, id),
-                Record::Solids(solid) => object.solid_blocks[at].push(solid),
+                Record::Solids(_) => unreachable!("leaves are of one class"),
             }
         }
+    }
+}
+
+impl<S: Real> Object<S> {
+    /// Lists some of its solids as a block.
+    fn list_solids(&mut self, solids: impl Iterator<Item = u32>) -> SolidBlock {
+        let (soles, swept) = (self.soles.len() as u32, self.swept.len() as u32);
+        for number in solids {
+            let PlacedSolid { solid, first_prim } = &self.solids[number as usize];
+            match solid.sole(number, first_prim + solid.number(0)) {
+                Some(sole) => self.soles.push(sole),
+                None => self.swept.push(number),
+            }
+        }
+        SolidBlock { soles: soles..self.soles.len() as u32, swept: swept..self.swept.len() as u32 }
     }
 }
 

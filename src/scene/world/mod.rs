@@ -12,6 +12,8 @@ mod successor;
 mod surface;
 mod uv;
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 pub use crate::bvh::{BuildSettings, Preset};
@@ -97,10 +99,35 @@ pub struct Object<S> {
     pub unbounded: Vec<Block<S, { Placed::FIELDS }>>,
     /// Trees of solids.
     pub solids: Vec<PlacedSolid<S>>,
-    /// Blocks of bounded trees of solids: indices into [`Object::solids`].
-    pub solid_blocks: Vec<Vec<u32>>,
+    /// Blocks of bounded trees of solids.
+    pub solid_blocks: Vec<SolidBlock>,
     /// Trees of solids without bounds: tested for every ray.
-    pub unbounded_solids: Vec<u32>,
+    pub unbounded_solids: SolidBlock,
+    /// Those of the blocks that are one simple solid.
+    pub soles: Vec<csg::Sole<S>>,
+    /// The others of the blocks: indices into [`Object::solids`].
+    pub swept: Vec<u32>,
+}
+
+/// Some of an object's solids.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SolidBlock {
+    /// Part of [`Object::soles`].
+    pub soles: Range<u32>,
+    /// Part of [`Object::swept`].
+    pub swept: Range<u32>,
+}
+
+impl SolidBlock {
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.soles.len() + self.swept.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
 /// A compiled tree of solids (or a part of one that touches no other part).
@@ -271,7 +298,7 @@ impl<S: Real> World<S> {
             let q = object.tree.quality();
             let unbounded: usize = object.unbounded.iter().map(Block::len).sum();
             // The tree holds each solid once, which stands for its leaves.
-            let held: usize = object.solid_blocks.iter().map(Vec::len).sum();
+            let held: usize = object.solid_blocks.iter().map(SolidBlock::len).sum();
             let leaves: usize = object.solids.iter().map(|s| s.solid.leaf_count()).sum();
             stats.prims += (q.prims + unbounded + leaves - held) as u64;
             stats.nodes += q.nodes as u64;
@@ -301,6 +328,7 @@ impl<S: Real> Object<S> {
             + placed
             + size_of_val(&self.unbounded[..])
             + self.solids.iter().map(|s| s.solid.bytes()).sum::<usize>()
+            + size_of_val(&self.soles[..])
     }
 
     /// What it is made of.
