@@ -25,10 +25,17 @@ pub struct Sole<S> {
 }
 
 impl<S: Real> Solid<S> {
-    /// As number `solid` of a list, primitive `prim`, if it is one leaf, box and all, which lines pass through at most once.
-    pub fn sole(&self, solid: u32, prim: u32) -> Option<Sole<S>> {
-        let only = self.is_sole.then(|| self.leaves[0]).filter(|leaf| leaf.kind.is_span());
-        only.map(|leaf| Sole { solid, prim, size: self.size, least: self.least, leaf })
+    /// As number `solid` of a list, if it is one leaf, box and all, which lines pass through at most once. `first_prim`: number of
+    /// the primitive that leaf 0 of its program is.
+    pub fn sole(&self, solid: u32, first_prim: u32) -> Option<Sole<S>> {
+        let only = self.leaves.first().filter(|leaf| self.is_sole && leaf.kind.is_span());
+        only.map(|leaf| Sole {
+            solid,
+            prim: first_prim + self.number(0),
+            size: self.size,
+            least: self.least,
+            leaf: *leaf,
+        })
     }
 }
 

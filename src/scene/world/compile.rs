@@ -276,7 +276,7 @@ impl<S: Real> Object<S> {
         let (soles, swept) = (self.soles.len() as u32, self.swept.len() as u32);
         for number in solids {
             let PlacedSolid { solid, first_prim } = &self.solids[number as usize];
-            match solid.sole(number, first_prim + solid.number(0)) {
+            match solid.sole(number, *first_prim) {
                 Some(sole) => self.soles.push(sole),
                 None => self.swept.push(number),
             }
