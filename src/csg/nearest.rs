@@ -4,7 +4,7 @@ use super::operands::{MOST, Operands};
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 
 /// Of the machine's vectors.
-type MaskOf<S> = <<S as Real>::Wide as Lanes>::Mask;
+pub(super) type MaskOf<S> = <<S as Real>::Wide as Lanes>::Mask;
 
 /// A place on the lines: ray parameter, face, number of the operand.
 #[derive(Clone, Copy)]

@@ -1,5 +1,5 @@
-//! Solids that are one leaf which lines pass through at most once: all that it takes to trace one in one place, as thousands of
-//! them do not fit into the caches otherwise.
+//! Solids that are one leaf which lines pass through at most once: all that it takes to trace one in one place
+//! (sphere flakes: results/NOTES.md).
 
 use super::events::settled;
 use super::leaf::Leaf;

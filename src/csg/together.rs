@@ -3,11 +3,9 @@
 //! It is a sweep over few operands, in vectors of the machine's: what lies together counts as one event, and whether a lane is
 //! inside is asked after all of it.
 
+use super::nearest::MaskOf;
 use super::operands::{MOST, Operands};
 use crate::lanes::{LaneMask, Lanes, Real};
-
-/// Of the machine's vectors.
-type MaskOf<S> = <<S as Real>::Wide as Lanes>::Mask;
 
 impl<S: Real> Operands<S> {
     /// Finds the first boundary in those of the lanes of the vector from `first` on that are still to be swept, if all operands that
