@@ -74,6 +74,7 @@ fn bits(output: &RenderOutput) -> Vec<Vec<u32>> {
     let plane_bits = |data: &PlaneData| match data {
         PlaneData::F32(v) => v.iter().map(|x| x.to_bits()).collect(),
         PlaneData::U32(v) => v.clone(),
+        PlaneData::U8(v) => v.iter().map(|&level| level.into()).collect(),
     };
     output.film.planes.iter().map(|plane| plane_bits(&plane.data)).collect()
 }

@@ -4,7 +4,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{DAffine3, DMat3, DVec3};
 use lanecast::camera::{Camera, framing};
-use lanecast::film::PlaneData;
+use lanecast::film::{PlaneData, Window, pix};
+use lanecast::render::progressive::Progressive;
 use lanecast::render::{Aov, Progress, RenderOptions, RenderOutput, Silent, render};
 use lanecast::scene::description::{Description, Item, ItemKind, Light, Material, Shape};
 use lanecast::scene::world::{Preset, World};
@@ -33,6 +34,7 @@ fn bits(output: &RenderOutput) -> Vec<(String, Vec<u32>)> {
     let plane_bits = |data: &PlaneData| match data {
         PlaneData::F32(v) => v.iter().map(|x| x.to_bits()).collect(),
         PlaneData::U32(v) => v.clone(),
+        PlaneData::U8(v) => v.iter().map(|&level| level.into()).collect(),
     };
     output.film.planes.iter().map(|plane| (plane.name.clone(), plane_bits(&plane.data))).collect()
 }
@@ -77,6 +79,29 @@ fn threads_and_tiles_change_nothing_in_f32() {
 #[test]
 fn threads_and_tiles_change_nothing_in_f64() {
     threads_and_tiles_change_nothing::<f64>();
+}
+
+/// What a `.pix` file gets is the same whether the film holds levels or floats.
+#[test]
+fn levels_are_those_of_the_colours() {
+    let d = scene();
+    let world = World::<f64>::compile(&d, Preset::Balanced).unwrap();
+    let camera = Camera::new(&framing(world.bounds(), 1.5), 1.5).unwrap();
+    for (spp, stops, crop) in [(1, 0.0, None), (3, -1.7, None), (1, 0.6, Some(Window { x0: 5, y0: 3, x1: 61, y1: 44 }))]
+    {
+        let floats = RenderOptions { spp, crop, aovs: Vec::new(), ..options() };
+        let levels = RenderOptions { levels: Some(stops), ..floats.clone() };
+        let [floats, levels] = [floats, levels].map(|o| render(&world, &d, &camera, &o, &Silent).unwrap().film);
+        assert_eq!(levels.planes.iter().map(|plane| plane.name.as_str()).collect::<Vec<_>>(), ["R", "G", "B"]);
+        assert!(levels.planes.iter().all(|plane| matches!(plane.data, PlaneData::U8(_))));
+        let bytes = pix::to_bytes(&floats, stops).unwrap();
+        assert!(bytes.iter().any(|&byte| byte != bytes[0]), "a picture with something in it");
+        assert!(pix::to_bytes(&levels, stops).unwrap() == bytes, "{spp} samples, {stops} stops");
+    }
+    let blocks = RenderOptions { levels: Some(0.0), ..options() };
+    let engine = lanecast::trace::engine::<f64>("scalar").unwrap();
+    let error = Progressive::new(engine, &world, &d, &camera, &RenderOptions { aovs: Vec::new(), ..blocks }, 4).err();
+    assert!(error.unwrap().to_string().contains("levels"));
 }
 
 #[test]

@@ -31,7 +31,7 @@ fn leaks<S: Engines>(description: &Description, camera: Option<CameraDescription
     let film = render(&world, description, &camera, &options, &Silent).unwrap().film;
     let plane = |name: &str| match &film.planes.iter().find(|p| p.name == name).unwrap().data {
         PlaneData::F32(data) => data.clone(),
-        PlaneData::U32(_) => panic!("{name} is a float plane"),
+        PlaneData::U32(_) | PlaneData::U8(_) => panic!("{name} is a float plane"),
     };
     let open: Vec<f32> = plane("R").into_iter().zip(plane("A")).filter(|(_, a)| *a == 1.0).map(|(r, _)| r).collect();
     (open.iter().filter(|&&r| r != 1.0).count() as f64 / open.len().max(1) as f64, open.len())

@@ -39,6 +39,7 @@ fn bits(film: &Film) -> Vec<Vec<u32>> {
     let plane = |data: &PlaneData| match data {
         PlaneData::F32(v) => v.iter().map(|x| x.to_bits()).collect(),
         PlaneData::U32(v) => v.clone(),
+        PlaneData::U8(v) => v.iter().map(|&level| level.into()).collect(),
     };
     film.planes.iter().map(|p| plane(&p.data)).collect()
 }

@@ -65,6 +65,7 @@ fn value(film: &Film, plane: &str, x: u32, y: u32) -> f64 {
     match &film.planes.iter().find(|p| p.name == plane).unwrap().data {
         PlaneData::F32(data) => f64::from(data[index]),
         PlaneData::U32(data) => f64::from(data[index]),
+        PlaneData::U8(data) => f64::from(data[index]) / 255.0,
     }
 }
 

@@ -9,7 +9,7 @@ use super::passes::Passes;
 use super::sampling::PixelRandom;
 use super::sobol::{PixelPoints, fraction};
 use super::tiles::{FILE_TILE, PixelRect, Tiling, morton_decode};
-use crate::lanes::Real;
+use crate::lanes::{Real, f64x8};
 use crate::ray::Rays;
 use crate::ray::pencil::{Pencil, Places};
 
@@ -100,7 +100,7 @@ pub fn fill_passes<S: Real>(
     let count = pencil.len();
     rays.prepare(count);
     for axis in 0..3 {
-        let (eye, u, v) = (camera.eye[axis], camera.u[axis], camera.v[axis]);
+        let [eye, u, v] = [camera.eye, camera.u, camera.v].map(|of| f64x8::splat(of[axis]));
         pencil.places.combine(&mut rays.org[axis][..count], |a| a * u, |b| b * v, |au, bv| eye + (au + bv));
         rays.dir[axis][..count].fill(S::from_f64(-camera.n[axis]));
     }

@@ -152,6 +152,11 @@ impl RenderArgs {
         self.files.first().map(|file| file.path.display().to_string()).unwrap_or_default()
     }
 
+    /// Whether all that is wanted of the picture are the levels of `.pix` files.
+    fn holds_levels(&self) -> bool {
+        !self.preview.by_blocks() && self.files.iter().all(|file| file.format == Format::Pix)
+    }
+
     /// The arguments of a plain EXR picture of a scene: what a bench leaves beside its rows.
     pub(super) fn plain(scene: SceneArgs, camera: CameraArgs, threads: ThreadArgs, path: PathBuf) -> Self {
         Self {
@@ -270,6 +275,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         ao_samples: args.ao_samples,
         ao_radius: args.ao_radius,
         aovs: Aov::parse_list(&args.aov)?,
+        levels: args.holds_levels().then_some(args.exposure),
         count: args.output.verbose > 0,
     };
     options.check()?;

@@ -8,6 +8,7 @@ use std::path::Path;
 use super::planes::{COLOR, Film, PlaneData};
 use super::{input, write_atomically};
 use crate::error::{Error, Result};
+use crate::lanes::f64x8;
 
 /// Bytes of a pixel.
 const CHANNELS: usize = 3;
@@ -18,24 +19,48 @@ pub fn level(value: f64) -> u8 {
     (value * 255.0 + 0.5) as u8
 }
 
+/// The [`level`]s of `values` times `gain`, one for each, as many as there are of both.
+pub fn levels(values: &[f32], gain: f64, to: &mut [u8]) {
+    let splat = f64x8::splat;
+    // Whole numbers behind this have their lowest bits in its lowest bits.
+    let behind = f64::from_bits(0x4330_0000_0000_0000);
+    let (chunks, rest) = values.as_chunks::<8>();
+    let (parts, ends) = to.as_chunks_mut::<8>();
+    for (values, part) in chunks.iter().zip(parts) {
+        let scaled = f64x8::new(values.map(f64::from)) * splat(gain) * splat(255.0) + splat(0.5);
+        // The first of the two is the other one where it is not a number.
+        let whole = scaled.fast_max(splat(0.0)).fast_min(splat(255.0)).trunc() + splat(behind);
+        *part = whole.to_array().map(|x| x.to_bits() as u8);
+    }
+    rest.iter().zip(ends).for_each(|(&value, to)| *to = level(f64::from(value) * gain));
+}
+
 /// The colour planes as the bytes of a `.pix` file of the data window's size: linear colour times 2^`exposure`, see
-/// [`level`]. Coverage is not kept.
+/// [`level`], or levels as they are. Coverage is not kept.
 ///
 /// # Errors
 /// [`Error::Usage`] if a colour plane is missing or the film is broken.
 pub fn to_bytes(film: &Film, exposure: f32) -> Result<Vec<u8>> {
     film.validate()?;
-    let color = film.color()?;
-    let gain = f64::from(exposure).exp2();
-    let width = film.window.width() as usize;
-    let mut bytes = Vec::with_capacity(film.pixels() * CHANNELS);
-    for row in (0..film.window.height() as usize).rev() {
-        let [red, green, blue] = color.map(|plane| &plane[row * width..][..width]);
-        for ((red, green), blue) in red.iter().zip(green).zip(blue) {
-            bytes.extend([red, green, blue].map(|&value| level(f64::from(value) * gain)));
-        }
+    if let [Some(red), Some(green), Some(blue)] = COLOR.map(|name| film.u8_plane(name)) {
+        return Ok(interleaved(film, [red, green, blue], |levels, to| to.copy_from_slice(levels)));
     }
-    Ok(bytes)
+    let gain = f64::from(exposure).exp2();
+    Ok(interleaved(film, film.color()?, |values, to| levels(values, gain, to)))
+}
+
+/// Bytes of the pixels of `color`, the bottom row first; `bytes` makes those of a part of a plane.
+fn interleaved<T>(film: &Film, color: [&[T]; CHANNELS], bytes: impl Fn(&[T], &mut [u8])) -> Vec<u8> {
+    let width = film.window.width() as usize;
+    let mut all = Vec::with_capacity(film.pixels() * CHANNELS);
+    let mut rows = [const { Vec::new() }; CHANNELS];
+    rows.iter_mut().for_each(|row| row.resize(width, 0));
+    for row in (0..film.window.height() as usize).rev() {
+        rows.iter_mut().zip(color).for_each(|(to, plane)| bytes(&plane[row * width..][..width], to));
+        let [red, green, blue] = &rows;
+        all.extend(red.iter().zip(green).zip(blue).flat_map(|((&red, &green), &blue)| [red, green, blue]));
+    }
+    all
 }
 
 /// Writes the colour planes as a `.pix` file, see [`to_bytes`].
@@ -104,6 +129,15 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn many_levels_are_those_of_each(values in prop::collection::vec(prop_oneof![any::<f32>(), -0.5f32..1.5], 0..40), stops in -3f64..3.0) {
+            let gain = stops.exp2();
+            let mut many = vec![7; values.len()];
+            levels(&values, gain, &mut many);
+            let each: Vec<u8> = values.iter().map(|&value| level(f64::from(value) * gain)).collect();
+            prop_assert_eq!(many, each);
+        }
+
         #[test]
         fn bytes_survive_a_round_trip(width in 1u32..9, height in 1u32..9, seed in any::<u8>()) {
             let bytes: Vec<u8> = (0..width * height * 3).map(|i| (i as u8).wrapping_mul(37).wrapping_add(seed)).collect();

@@ -70,6 +70,8 @@ pub enum PlaneData {
     F32(Vec<f32>),
     /// Numbers (ids).
     U32(Vec<u32>),
+    /// Levels of a `.pix` picture: linear values, 255 is one (see [`super::pix::level`]).
+    U8(Vec<u8>),
 }
 
 impl PlaneData {
@@ -78,6 +80,7 @@ impl PlaneData {
         match self {
             Self::F32(v) => v.len(),
             Self::U32(v) => v.len(),
+            Self::U8(v) => v.len(),
         }
     }
 
@@ -161,7 +164,7 @@ impl Film {
     pub fn f32_plane(&self, name: &str) -> Option<&[f32]> {
         match &self.plane(name)?.data {
             PlaneData::F32(v) => Some(v),
-            PlaneData::U32(_) => None,
+            PlaneData::U32(_) | PlaneData::U8(_) => None,
         }
     }
 
@@ -169,7 +172,15 @@ impl Film {
     pub fn u32_plane(&self, name: &str) -> Option<&[u32]> {
         match &self.plane(name)?.data {
             PlaneData::U32(v) => Some(v),
-            PlaneData::F32(_) => None,
+            PlaneData::F32(_) | PlaneData::U8(_) => None,
+        }
+    }
+
+    /// Samples of the plane of levels called `name`.
+    pub fn u8_plane(&self, name: &str) -> Option<&[u8]> {
+        match &self.plane(name)?.data {
+            PlaneData::U8(v) => Some(v),
+            PlaneData::F32(_) | PlaneData::U32(_) => None,
         }
     }
 
@@ -177,7 +188,7 @@ impl Film {
     pub fn f32_plane_mut(&mut self, name: &str) -> Option<&mut [f32]> {
         match &mut self.planes.iter_mut().find(|p| p.name == name)?.data {
             PlaneData::F32(v) => Some(v),
-            PlaneData::U32(_) => None,
+            PlaneData::U32(_) | PlaneData::U8(_) => None,
         }
     }
 
@@ -185,7 +196,7 @@ impl Film {
     pub fn u32_plane_mut(&mut self, name: &str) -> Option<&mut [u32]> {
         match &mut self.planes.iter_mut().find(|p| p.name == name)?.data {
             PlaneData::U32(v) => Some(v),
-            PlaneData::F32(_) => None,
+            PlaneData::F32(_) | PlaneData::U8(_) => None,
         }
     }
 

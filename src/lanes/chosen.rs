@@ -32,6 +32,21 @@ pub fn positions_in<V: Lanes>(list: &[u32], wanted: u32) -> u32 {
     }
 }
 
+/// The words of `list` in `lanes`, each with those of the lanes that have it.
+#[inline(always)]
+pub fn groups(list: &[u32; MAX_LANES], lanes: u32) -> impl Iterator<Item = (u32, u32)> {
+    let mut rest = lanes;
+    std::iter::from_fn(move || {
+        let lead = rest.trailing_zeros() as usize;
+        (rest != 0).then(|| {
+            let word = list[lead % MAX_LANES];
+            let same = positions(list, word) & rest;
+            rest &= !same;
+            (word, same)
+        })
+    })
+}
+
 /// A list with `new` where the mask is set. Numbers are moved as floats: selection copies bits.
 #[inline(always)]
 pub fn merge(mask: <f32x16 as Lanes>::Mask, new: u32, old: [u32; MAX_LANES]) -> [u32; MAX_LANES] {
@@ -142,6 +157,29 @@ impl Chosen {
         self.list[..self.count].iter().map(|&lane| usize::from(lane) % MAX_LANES)
     }
 
+    /// Their numbers, counted from `first`, before numbers without meaning.
+    #[inline(always)]
+    pub fn numbers(&self, first: u32) -> [u32; MAX_LANES] {
+        let mut numbers = [first; MAX_LANES];
+        numbers.iter_mut().zip(self.list).for_each(|(number, lane)| *number += u32::from(lane));
+        numbers
+    }
+
+    /// Adds their words of `from` to a list.
+    #[inline(always)]
+    pub fn extend(&self, from: &[u32], to: &mut Vec<u32>) {
+        let mut words = [0; MAX_LANES];
+        match from.first_chunk::<MAX_LANES>() {
+            Some(from) => {
+                words.iter_mut().zip(self.list).for_each(|(word, lane)| *word = from[usize::from(lane) % MAX_LANES])
+            }
+            None => words.iter_mut().zip(self.iter()).for_each(|(word, lane)| *word = from[lane]),
+        }
+        // All of them and some back: no call for a few words.
+        to.extend_from_slice(&words);
+        to.truncate(to.len() - MAX_LANES + self.count);
+    }
+
     /// Writes their values to the first places of `to`, which has [`Self::count`] at least, and zeros after them as far as a
     /// vector reaches, if there is room for all of it.
     #[inline(always)]
@@ -228,6 +266,14 @@ mod tests {
     use crate::lanes::{f32x4, f32x8, f32x16, f64x4};
 
     #[test]
+    fn groups_are_the_lanes_of_each_word() {
+        let list = std::array::from_fn(|lane| [7, 3, 7, 9][lane % 4]);
+        let found: Vec<_> = groups(&list, 0b0111_0110).collect();
+        assert_eq!(found, [(3, 0b10_0010), (7, 0b101_0100)]);
+        assert_eq!(groups(&list, 0).next(), None);
+    }
+
+    #[test]
     fn some_lanes_come_in_order() {
         let v = f32x16::new(std::array::from_fn(|i| i as f32 * 0.5));
         for bits in [0u32, 1, 0x8000, 0b1010_0110_0001, 0xffff] {
@@ -238,6 +284,13 @@ mod tests {
             chosen.pack(v, &mut to);
             assert!(want.iter().zip(to).all(|(&lane, x)| x == lane as f32 * 0.5));
             assert!(to[want.len()..16].iter().all(|&x| x == 0.0) && to[16] == -1.0);
+            for from in [&(20..36).collect::<Vec<u32>>(), &(20..60).collect()] {
+                let mut words = vec![3];
+                chosen.extend(from, &mut words);
+                let wanted = want.iter().map(|&lane| 20 + lane as u32);
+                assert!(words.into_iter().eq([3].into_iter().chain(wanted)));
+            }
+            assert!(want.iter().zip(chosen.numbers(7)).all(|(&lane, number)| number == 7 + lane as u32));
             let mut short = [-1.0; 15];
             if want.len() < 16 {
                 chosen.pack(v, &mut short);

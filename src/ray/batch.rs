@@ -106,15 +106,21 @@ impl<S: Real> Rays<S> {
         self.t_max[i] = t_max;
     }
 
-    /// Sets rays from `first` on to those of the lanes `chosen` of origins, directions and ends; they start at 0. What follows
-    /// them is unspecified, as far as a vector reaches.
+    /// Sets rays from `first` on to those of the lanes `chosen` of origins, directions, beginnings and ends. What follows them
+    /// is unspecified, as far as a vector reaches.
     #[inline(always)]
-    pub fn put(&mut self, first: usize, chosen: &Chosen, [org, dir]: [Lanes3<S::Wide>; 2], t_max: S::Wide) {
+    pub fn put(
+        &mut self,
+        first: usize,
+        chosen: &Chosen,
+        [org, dir]: [Lanes3<S::Wide>; 2],
+        [t_min, t_max]: [S::Wide; 2],
+    ) {
         for axis in 0..3 {
             chosen.pack(org[axis], &mut self.org[axis][first..]);
             chosen.pack(dir[axis], &mut self.dir[axis][first..]);
         }
-        self.t_min[first..first + chosen.count()].fill(S::ZERO);
+        chosen.pack(t_min, &mut self.t_min[first..]);
         chosen.pack(t_max, &mut self.t_max[first..]);
     }
 
@@ -159,8 +165,14 @@ impl<S: Real> Rays<S> {
     /// Number of live rays.
     pub fn live_count(&self) -> usize {
         // The padding is dead.
-        let starts = (0..self.padded_len()).step_by(S::Wide::N);
-        starts.map(|first| self.live_lanes(first).count_ones() as usize).sum()
+        self.live_among(self.padded_len())
+    }
+
+    /// Number of live rays among the first `count`.
+    pub fn live_among(&self, count: usize) -> usize {
+        let among = |first: usize| u32::MAX.checked_shl((count - first) as u32).map_or(u32::MAX, |beyond| !beyond);
+        let starts = (0..count).step_by(S::Wide::N);
+        starts.map(|first| (self.live_lanes(first) & among(first)).count_ones() as usize).sum()
     }
 }
 

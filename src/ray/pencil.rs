@@ -1,7 +1,7 @@
 //! Rays through one point, as a camera makes them: what an engine can make itself, in coordinates of its own.
 
 use super::Rays;
-use crate::lanes::{Real, each};
+use crate::lanes::{Real, each, f64x8};
 
 /// Pixels along the edge of the largest square of rays.
 pub const EDGE: usize = 32;
@@ -107,7 +107,7 @@ impl Pencil {
         let count = self.len();
         rays.prepare(count);
         for axis in 0..3 {
-            let [right, up, forward] = each(|k| self.axes[k][axis]);
+            let [right, up, forward] = each(|k| f64x8::splat(self.axes[k][axis]));
             rays.org[axis][..count].fill(S::from_f64(self.origin[axis]));
             self.places.combine(&mut rays.dir[axis][..count], |a| a * right, |b| b * up, |a, b| a + b + forward);
         }
@@ -140,31 +140,52 @@ impl Places {
     pub fn combine<S: Real>(
         &self,
         to: &mut [S],
-        first: impl Fn(f64) -> f64,
-        second: impl Fn(f64) -> f64,
-        value: impl Fn(f64, f64) -> f64,
+        first: impl Fn(f64x8) -> f64x8,
+        second: impl Fn(f64x8) -> f64x8,
+        value: impl Fn(f64x8, f64x8) -> f64x8,
     ) {
+        let (blocks, _) = to.as_chunks_mut::<16>();
         match self {
             Self::Grid([columns, rows]) => {
-                let (mut of_column, mut of_row) = ([0.0; EDGE], [0.0; EDGE]);
-                of_column.iter_mut().zip(columns).for_each(|(to, a)| *to = first(*a));
-                of_row.iter_mut().zip(rows).for_each(|(to, b)| *to = second(*b));
-                let (blocks, _) = to.as_chunks_mut::<16>();
+                // Once for all blocks of the same four columns, or rows. Both halves of a block have all four columns.
+                let mut across = [f64x8::ZERO; EDGE / 4];
+                let mut down = [[f64x8::ZERO; 2]; EDGE / 4];
+                for four in 0..EDGE / 4 {
+                    let [left, _] = halves(&spread(columns, 4 * four, 0));
+                    across[four] = first(left);
+                    let [upper, lower] = halves(&spread(rows, 4 * four, 1));
+                    down[four] = [second(upper), second(lower)];
+                }
                 for (block, to) in blocks.iter_mut().enumerate() {
                     let [x, y] = corner(block);
-                    let (a, b) = (spread(&of_column, x, 0), spread(&of_row, y, 1));
-                    // Block by block: made in place, the compiler scatters the numbers of several blocks.
-                    let mut of_block = [S::ZERO; 16];
-                    for i in 0..16 {
-                        of_block[i] = S::from_f64(value(a[i], b[i]));
-                    }
-                    *to = of_block;
+                    let (a, [upper, lower]) = (across[x / 4], down[y / 4]);
+                    round([value(a, upper), value(a, lower)], to);
                 }
             }
-            Self::Each([a, b]) => {
-                let places = a.iter().zip(b);
-                to.iter_mut().zip(places).for_each(|(to, (a, b))| *to = S::from_f64(value(first(*a), second(*b))));
+            Self::Each(_) => {
+                for (block, to) in blocks.iter_mut().enumerate() {
+                    let [[a, c], [b, d]] = self.of_block(block).each_ref().map(halves);
+                    round([value(first(a), second(b)), value(first(c), second(d))], to);
+                }
             }
+        }
+    }
+}
+
+/// The numbers of a block in two vectors.
+#[inline(always)]
+fn halves(of_block: &[f64; 16]) -> [f64x8; 2] {
+    let half = |at: usize| f64x8::new(of_block[at..].first_chunk().copied().unwrap_or([0.0; 8]));
+    [half(0), half(8)]
+}
+
+/// Rounds the numbers of a block to the precision of `to`.
+#[inline(always)]
+fn round<S: Real>(halves: [f64x8; 2], to: &mut [S; 16]) {
+    for (half, to) in halves.iter().zip(to.as_chunks_mut::<8>().0) {
+        let half = half.to_array();
+        for i in 0..8 {
+            to[i] = S::from_f64(half[i]);
         }
     }
 }

@@ -19,14 +19,23 @@ pub enum Get {
     F32(fn(&Pixel) -> f64),
     /// As it is.
     U32(fn(&Pixel) -> u32),
+    /// Its level, see [`crate::film::pix::level`].
+    U8(fn(&Pixel) -> f64),
 }
 
-/// The planes every picture has: linear colour and coverage.
+/// The planes of nearly every picture: linear colour and coverage.
 pub const COLOR: [Channel; 4] = [
     Channel { name: "R", get: Get::F32(|p| p.color.radiance.x) },
     Channel { name: "G", get: Get::F32(|p| p.color.radiance.y) },
     Channel { name: "B", get: Get::F32(|p| p.color.radiance.z) },
     Channel { name: "A", get: Get::F32(|p| p.color.alpha) },
+];
+
+/// Linear colour as the bytes of `.pix` pictures, instead of [`COLOR`].
+pub const LEVELS: [Channel; 3] = [
+    Channel { name: "R", get: Get::U8(|p| p.color.radiance.x) },
+    Channel { name: "G", get: Get::U8(|p| p.color.radiance.y) },
+    Channel { name: "B", get: Get::U8(|p| p.color.radiance.z) },
 ];
 
 /// A group of planes besides R, G, B and A.

@@ -2,35 +2,66 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
-
-use super::aov::{Aov, COLOR, Channel, Get};
+use super::aov::{Aov, COLOR, Channel, Get, LEVELS};
+use super::options::RenderOptions;
 use super::pixels::Pixel;
 use super::sums::Finished;
 use crate::camera::morton_encode;
+use crate::film::pix::{level, levels};
 use crate::film::{Film, Plane, PlaneData, Window};
 use crate::lanes::ask_for_large_pages;
-use crate::shade::Rgba;
 
-/// The planes of a picture: colour, coverage, and those of `aovs`.
-pub(super) fn channels(aovs: &[Aov]) -> Vec<Channel> {
-    let extra = Aov::ALL.into_iter().filter(|aov| aovs.contains(aov)).flat_map(Aov::channels);
-    COLOR.iter().chain(extra).copied().collect()
+/// Pixels whose colours become planes together.
+const ROW: usize = 32;
+
+/// The planes of a picture: its colours, and those of its AOVs.
+pub(super) struct Channels {
+    list: Vec<Channel>,
+    /// How many of them are colours.
+    colors: usize,
+    /// What radiance is multiplied by before it becomes levels.
+    gain: f64,
+}
+
+impl Channels {
+    /// Those that `options` ask for.
+    pub fn new(options: &RenderOptions) -> Self {
+        let colors = if options.levels.is_some() { &LEVELS[..] } else { &COLOR };
+        let extra = Aov::ALL.into_iter().filter(|aov| options.aovs.contains(aov)).flat_map(Aov::channels);
+        let gain = f64::from(options.levels.unwrap_or(0.0)).exp2();
+        Self { list: colors.iter().chain(extra).copied().collect(), colors: colors.len(), gain }
+    }
+
+    /// A list for each plane, made of `f32`s, `u32`s or `u8`s.
+    fn data(
+        &self,
+        f32s: impl Fn(fn(&Pixel) -> f64) -> Vec<f32>,
+        u32s: impl Fn(fn(&Pixel) -> u32) -> Vec<u32>,
+        u8s: impl Fn(fn(&Pixel) -> f64) -> Vec<u8>,
+    ) -> impl Iterator<Item = PlaneData> {
+        self.list.iter().map(move |channel| match channel.get {
+            Get::F32(get) => PlaneData::F32(f32s(get)),
+            Get::U32(get) => PlaneData::U32(u32s(get)),
+            Get::U8(get) => PlaneData::U8(u8s(get)),
+        })
+    }
 }
 
 /// A film of misses in a black world.
-pub(super) fn empty_film(size: (u32, u32), window: Window, channels: &[Channel]) -> Film {
+pub(super) fn empty_film(size: (u32, u32), window: Window, channels: &Channels) -> Film {
     let area = window.area() as usize;
-    let data = |channel: &Channel| match channel.get {
-        Get::F32(get) => PlaneData::F32(vec![get(&Pixel::EMPTY) as f32; area]),
-        Get::U32(get) => PlaneData::U32(vec![get(&Pixel::EMPTY); area]),
-    };
-    let plane = |channel: &Channel| Plane { name: channel.name.to_string(), data: data(channel) };
-    let planes: Vec<Plane> = channels.iter().map(plane).collect();
+    let data = channels.data(
+        |get| vec![get(&Pixel::EMPTY) as f32; area],
+        |get| vec![get(&Pixel::EMPTY); area],
+        |get| vec![level(get(&Pixel::EMPTY)); area],
+    );
+    let plane = |(channel, data): (&Channel, _)| Plane { name: channel.name.to_string(), data };
+    let planes: Vec<Plane> = channels.list.iter().zip(data).map(plane).collect();
     for plane in &planes {
         match &plane.data {
             PlaneData::F32(values) => ask_for_large_pages(values),
             PlaneData::U32(values) => ask_for_large_pages(values),
+            PlaneData::U8(values) => ask_for_large_pages(values),
         }
     }
     Film { width: size.0, height: size.1, window, planes, texts: Vec::new() }
@@ -52,6 +83,8 @@ pub(super) struct Patch {
     runs: Vec<Range<usize>>,
     /// Numbers of the pixels that have one.
     kept: Vec<u32>,
+    /// Numbers of the pixels of a square's first row.
+    columns: Vec<u32>,
     /// Those pixels, if there are planes besides colours.
     pixels: Vec<Pixel>,
     /// By channel: the value of each place.
@@ -61,33 +94,19 @@ pub(super) struct Patch {
 impl Patch {
     /// Takes the planes' values of those pixels of `layout` that lie in `window` from `finished`, parallel to them, and forgets
     /// earlier ones; `channels` are the same each time.
-    pub fn fill(&mut self, channels: &[Channel], window: Window, layout: Layout<'_>, finished: Finished<'_>) {
+    pub fn fill(&mut self, channels: &Channels, window: Window, layout: Layout<'_>, finished: Finished<'_>) {
         self.lay_out(window, layout);
         if self.values.is_empty() {
-            self.values.extend(channels.iter().map(|channel| match channel.get {
-                Get::F32(_) => PlaneData::F32(Vec::new()),
-                Get::U32(_) => PlaneData::U32(Vec::new()),
-            }));
+            self.values.extend(channels.data(|_| Vec::new(), |_| Vec::new(), |_| Vec::new()));
         }
-        let kept = self.kept.iter().map(|&number| number as usize);
-        let (color, further) = self.values.split_at_mut(COLOR.len());
-        if let [PlaneData::F32(r), PlaneData::F32(g), PlaneData::F32(b), PlaneData::F32(a)] = color {
-            for list in [&mut *r, &mut *g, &mut *b, &mut *a] {
-                list.resize(self.kept.len(), 0.0);
-            }
-            let lists = r.iter_mut().zip(g).zip(b.iter_mut().zip(a));
-            for (((r, g), (b, a)), number) in lists.zip(kept.clone()) {
-                let Rgba { radiance: DVec3 { x, y, z }, alpha } = finished.color(number);
-                // Four numbers converted at once.
-                [*r, *g, *b, *a] = [x, y, z, alpha].map(|value| value as f32);
-            }
-        }
+        let (colors, further) = self.values.split_at_mut(channels.colors);
+        take_colors(channels.gain, &self.kept, finished, colors);
         if further.is_empty() {
             return;
         }
         self.pixels.clear();
-        self.pixels.extend(kept.map(|number| finished.pixel(number)));
-        for (channel, values) in channels[COLOR.len()..].iter().zip(further) {
+        self.pixels.extend(self.kept.iter().map(|&number| finished.pixel(number as usize)));
+        for (channel, values) in channels.list[channels.colors..].iter().zip(further) {
             match (channel.get, values) {
                 (Get::F32(get), PlaneData::F32(values)) => {
                     values.clear();
@@ -117,10 +136,12 @@ impl Patch {
             }
             Layout::Square((left, top), edge) => {
                 let columns = left.max(window.x0)..(left + edge).min(window.x1);
+                self.columns.clear();
+                self.columns.extend(columns.clone().map(|x| morton_encode(x - left, 0)));
                 for y in top.max(window.y0)..(top + edge).min(window.y1) {
                     let Some(place) = window.index(columns.start, y) else { continue };
                     let row = morton_encode(0, y - top);
-                    self.kept.extend(columns.clone().map(|x| morton_encode(x - left, 0) | row));
+                    self.kept.extend(self.columns.iter().map(|column| column | row));
                     self.runs.push(place..place + columns.len());
                 }
             }
@@ -138,7 +159,34 @@ impl Patch {
             match (&mut plane.data, values) {
                 (PlaneData::F32(data), PlaneData::F32(values)) => copy(&self.runs, values, data),
                 (PlaneData::U32(data), PlaneData::U32(values)) => copy(&self.runs, values, data),
+                (PlaneData::U8(data), PlaneData::U8(values)) => copy(&self.runs, values, data),
                 _ => unreachable!("planes are made from the channels"),
+            }
+        }
+    }
+}
+
+/// Makes `planes` the colours of the pixels `kept` of `finished`, as floats or as levels of `gain` times as much.
+fn take_colors(gain: f64, kept: &[u32], finished: Finished<'_>, planes: &mut [PlaneData]) {
+    for plane in &mut *planes {
+        match plane {
+            PlaneData::F32(values) => values.clear(),
+            PlaneData::U32(values) => values.clear(),
+            PlaneData::U8(values) => values.clear(),
+        }
+    }
+    let mut rows = [[0.0; ROW]; 4];
+    for numbers in kept.chunks(ROW) {
+        finished.colors(numbers, &mut rows);
+        for (row, plane) in rows.iter().zip(&mut *planes) {
+            match plane {
+                PlaneData::F32(values) => values.extend_from_slice(&row[..numbers.len()]),
+                PlaneData::U8(values) => {
+                    let mut of_row = [0; ROW];
+                    levels(row, gain, &mut of_row);
+                    values.extend_from_slice(&of_row[..numbers.len()]);
+                }
+                PlaneData::U32(_) => unreachable!("colours are no numbers"),
             }
         }
     }
@@ -159,14 +207,16 @@ fn copy<T: Copy>(runs: &[Range<usize>], values: &[T], data: &mut [T]) {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::camera::morton_decode;
-    use crate::shade::{FirstHit, Samples};
+    use crate::shade::{FirstHit, Rgba, Samples};
 
     #[test]
     fn planes_are_named_and_row_major_over_the_window() {
         let window = Window { x0: 4, y0: 2, x1: 7, y1: 4 };
-        let channels = channels(&[Aov::Primitive, Aov::Z]);
+        let channels = Channels::new(&RenderOptions { aovs: vec![Aov::Primitive, Aov::Z], ..Default::default() });
         let mut film = empty_film((10, 10), window, &channels);
         let color = Rgba { radiance: DVec3::new(1.0, 2.0, 3.0), alpha: 1.0 };
         let hit = FirstHit { distance: 4.0, prim: 9, ..FirstHit::NONE };
@@ -188,7 +238,7 @@ mod tests {
     #[test]
     fn squares_are_painted_row_by_row() {
         let window = Window { x0: 1, y0: 0, x1: 4, y1: 3 };
-        let channels = channels(&[]);
+        let channels = Channels::new(&RenderOptions::default());
         let shown = |(x, y): (u32, u32)| Rgba { radiance: DVec3::splat(f64::from(10 * y + x)), alpha: 1.0 };
         let paint = |corner: (u32, u32), edge: u32| {
             let mut film = empty_film((5, 5), window, &channels);

@@ -5,11 +5,10 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::aov::Channel;
 use super::canvas::{Canvas, Memory};
 use super::mattes::{Coverage, Mattes};
 use super::options::{Progress, RenderOptions, rect_of};
-use super::patch::{channels, empty_film};
+use super::patch::{Channels, empty_film};
 use super::sums::{Finished, Sums};
 use super::tally::Tally;
 use crate::camera::Camera;
@@ -29,8 +28,8 @@ const FIRST_ROUND: u32 = 4;
 /// A picture and what it took.
 #[derive(Clone, Debug)]
 pub struct RenderOutput {
-    /// Planes R, G, B (linear Rec.709, premultiplied), A (coverage: hits, and a background that is not black), then
-    /// the wanted AOVs. Tiles not finished are black with alpha 0.
+    /// Planes R, G, B (linear Rec.709, premultiplied), A (coverage: hits, and a background that is not black; not beside
+    /// [`RenderOptions::levels`]), then the wanted AOVs. Tiles not finished are black with alpha 0.
     pub film: Film,
     /// Live rays traced, by kind.
     pub rays: RayCounts,
@@ -86,7 +85,7 @@ pub fn render_with<S: Real>(
     let start = Instant::now();
     let shader =
         Shader::new(world, description, engine, headlight(camera), options.settings()).with_rt(description, camera);
-    let channels = channels(&options.aovs);
+    let channels = Channels::new(options);
     let mut film = empty_film((options.width, options.height), window, &channels);
     let mattes = Mattes::new(world, description, &options.aovs, &mut film);
     let film = Mutex::new(film);
@@ -137,7 +136,7 @@ struct Job<'a, S: Real> {
     shader: Shader<'a, S>,
     canvas: Canvas<'a>,
     window: Window,
-    channels: Vec<Channel>,
+    channels: Channels,
     mattes: Option<Mattes<'a>>,
     progress: &'a dyn Progress,
     start: Instant,

@@ -87,16 +87,22 @@ pub(super) enum Finished<'a> {
 }
 
 impl Finished<'_> {
-    /// Colour of pixel `i`.
+    /// Red, green, blue and coverage of the pixels `numbers`, rounded, into the first places of `rows`.
     #[inline]
-    pub fn color(&self, i: usize) -> Rgba {
+    pub fn colors<const N: usize>(&self, numbers: &[u32], rows: &mut [[f32; N]; 4]) {
+        let mut put = |k: usize, Rgba { radiance: DVec3 { x, y, z }, alpha }: Rgba| {
+            // Four numbers converted at once.
+            let four = [x, y, z, alpha].map(|value| value as f32);
+            (0..4).for_each(|channel| rows[channel][k] = four[channel]);
+        };
+        let places = (0..N).zip(numbers);
         match self {
             // 0 + -0 is 0, as in a sum.
-            Self::Samples(samples) => {
-                let Rgba { radiance, alpha } = samples.colors[i];
-                Rgba { radiance: DVec3::ZERO + radiance, alpha: 0.0 + alpha }
-            }
-            Self::Sums(sums, count) => mean(&sums.colors[i], *count),
+            Self::Samples(samples) => places.for_each(|(k, &i)| {
+                let Rgba { radiance, alpha } = samples.colors[i as usize];
+                put(k, Rgba { radiance: DVec3::ZERO + radiance, alpha: 0.0 + alpha });
+            }),
+            Self::Sums(sums, count) => places.for_each(|(k, &i)| put(k, mean(&sums.colors[i as usize], *count))),
         }
     }
 
@@ -205,7 +211,10 @@ mod tests {
         (0..2).for_each(|ray| sums_of_one.add(ray, &two, ray));
         for ray in 0..2 {
             let (same, pixel) = (Finished::Samples(&two).pixel(ray), Finished::Sums(&sums_of_one, 1).pixel(ray));
-            assert_eq!((same, same.color), (pixel, Finished::Samples(&two).color(ray)));
+            let mut color = [[0.0]; 4];
+            Finished::Samples(&two).colors(&[ray as u32], &mut color);
+            let Rgba { radiance: DVec3 { x, y, z }, alpha } = same.color;
+            assert_eq!((same, color), (pixel, [x, y, z, alpha].map(|value| [value as f32])));
             assert_eq!(same.hit.normal.x.to_bits(), 0);
         }
         assert!((sums.error(4) - (1.0_f64 / 144.0).sqrt() / 0.25).abs() < 1e-12);

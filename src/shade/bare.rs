@@ -76,7 +76,8 @@ impl<S: Real> BareTriangles<S> {
                 bare |= 1 << lane;
             }
             let numbers: [S::Wide; EDGES] = records(bare, &NUMBERS, |lane| &own[lane as usize % MAX_LANES]);
-            let [corner, e1, e2] = [0, 3, 6].map(|k| [numbers[k], numbers[k + 1], numbers[k + 2]]);
+            let three = |k: usize| [numbers[k], numbers[k + 1], numbers[k + 2]];
+            let (corner, e1, e2) = (three(0), three(3), three(6));
             return (bare, Flat { corner, edges: [e1, e2], normal: unit_normal(e1, e2) });
         }
         let mut prim = [0; MAX_LANES];
@@ -87,8 +88,9 @@ impl<S: Real> BareTriangles<S> {
             bare |= u32::from(own != OTHER) << lane;
         }
         let numbers: [S::Wide; KEPT] = records(bare, &prim, |prim| &self.kept[prim as usize].numbers);
-        let [corner, e1, e2, normal] = [0, 3, 6, 9].map(|k| [numbers[k], numbers[k + 1], numbers[k + 2]]);
-        (bare, Flat { corner, edges: [e1, e2], normal })
+        // Written out: `map` of vectors is a call.
+        let three = |k: usize| [numbers[k], numbers[k + 1], numbers[k + 2]];
+        (bare, Flat { corner: three(0), edges: [three(3), three(6)], normal: three(9) })
     }
 }
 

@@ -38,8 +38,8 @@ impl<S: Real> Branches<S> {
     #[inline(always)]
     pub fn push(&mut self, lanes: u32, path: &[u32], [org, dir, weight]: [Lanes3<S::Wide>; 3], t_max: S) {
         let (chosen, first) = (Chosen::of(lanes), self.path.len());
-        self.path.extend(chosen.iter().map(|lane| path[lane]));
-        self.rays.put(first, &chosen, [org, dir], S::Wide::splat(t_max));
+        chosen.extend(path, &mut self.path);
+        self.rays.put(first, &chosen, [org, dir], [S::ZERO, t_max].map(S::Wide::splat));
         for axis in 0..3 {
             chosen.pack(weight[axis], &mut self.weight[axis][first..]);
         }

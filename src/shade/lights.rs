@@ -61,12 +61,15 @@ impl<V: Lanes> Lamp<V> {
                 let to_light = sub(from, position);
                 let largest = to_light[0].abs().fast_max(to_light[1].abs()).fast_max(to_light[2].abs());
                 // Squares of large and small distances would leave the range of numbers.
-                let scaled = scale(to_light, V::constant(1.0) / largest);
+                let nearer = V::constant(1.0) / largest;
+                let scaled = scale(to_light, nearer);
                 let square = dot(scaled, scaled);
                 let toward = scale(scaled, V::constant(1.0) / square.sqrt());
                 let share =
                     self.spot.map_or(V::constant(1.0), |(axis, cosines)| spot_share(-dot(toward, axis), cosines));
-                (map3(self.strength, |x| x * share / square / largest / largest), toward)
+                // One division for three colours.
+                let share = share / square;
+                (map3(self.strength, |x| x * share * nearer * nearer), toward)
             }
             None => (self.strength, self.toward),
         };

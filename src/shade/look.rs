@@ -141,6 +141,12 @@ impl<'a> Looks<'a> {
         ready.is_even && !matches!(material.scattering, Scattering::Dielectric { .. })
     }
 
+    /// Whether all points of material `id` look the same from one side, none shines, and no normal map bends the surface.
+    #[inline]
+    pub fn is_even(&self, id: u32) -> bool {
+        self.entry(id).1.is_even
+    }
+
     /// What every point of material `id` scatters with that is seen from the side of its normal (`from_front`) or from
     /// behind, if that is the same everywhere, none shines, and no normal map bends the surface.
     #[inline]

@@ -3,7 +3,7 @@
 use super::bare::BareTriangles;
 use super::look::Looks;
 use super::place::Place;
-use crate::lanes::chosen::lanes_of;
+use crate::lanes::chosen::{lanes_of, positions_in};
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real, dot, each};
 use crate::ray::{Hits, INVALID_ID, Rays};
 use crate::scene::world::World;
@@ -29,8 +29,7 @@ pub(super) struct Met<V> {
 /// The lanes of rays `first..first + N` that hit something.
 #[inline(always)]
 pub(super) fn met_lanes<S: Real>(hits: &Hits<S>, first: usize) -> u32 {
-    let prims = &hits.prim[first..][..S::Wide::N];
-    prims.iter().enumerate().fold(0, |hit, (lane, &prim)| hit | u32::from(prim != INVALID_ID) << lane)
+    !positions_in::<S::Wide>(&hits.prim[first..], INVALID_ID) & S::Wide::ALL
 }
 
 impl<S: Real> Meeting<S> {

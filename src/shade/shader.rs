@@ -9,7 +9,7 @@ use super::classic::Classic;
 use super::integrator::Integrator;
 use super::look::Looks;
 use super::look_lanes::{LookNumbers, numbers_of_sides};
-use super::meeting::Meeting;
+use super::meeting::{Meeting, met_lanes};
 use super::path::{PathMemory, Paths};
 use super::rt::Rt;
 use super::sample::{FirstHit, RayCounts, Samples};
@@ -19,7 +19,8 @@ use super::through::{Again, Through};
 use super::vertices::Vertices;
 use super::whitted;
 use crate::camera::Camera;
-use crate::lanes::Real;
+use crate::lanes::chosen::lanes_of;
+use crate::lanes::{Lanes, Real};
 use crate::ray::{Counters, Hits, Rays};
 use crate::scene::description::{Description, Light};
 use crate::scene::light::Environment;
@@ -205,7 +206,8 @@ impl<'a, S: Real> Shader<'a, S> {
         } else {
             self.intersect(rays, work, |i, layer| self.draw(spots[i]).number(0, layer));
         }
-        for i in (0..rays.len()).filter(|i| work.hits.is_hit(*i)) {
+        let hit = |first: usize| lanes_of(met_lanes(&work.hits, first)).map(move |lane| first + lane);
+        for i in (0..rays.padded_len()).step_by(S::Wide::N).flat_map(hit) {
             out.colors[i].alpha = 1.0;
             if let Some(seen) = out.hits.get_mut(i) {
                 self.show(rays, &work.hits, i, seen);

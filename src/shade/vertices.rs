@@ -9,8 +9,8 @@ use super::look_lanes::LookLanes;
 use super::meeting::{Met, met_lanes};
 use super::offset::position_error;
 use super::shader::Shader;
-use crate::lanes::chosen::{self, lanes_of};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each};
+use crate::lanes::chosen::{self, groups, lanes_of, merge};
+use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, f32x16};
 use crate::ray::{Hits, Rays};
 use crate::scene::world::Surface;
 
@@ -134,19 +134,19 @@ impl<S: Real> Shader<'_, S> {
             vertices.put_lanes(SHADING, first, place.normal);
             vertices.put_lanes(OFFSET, first, [place.offset]);
             let mut front = place.front;
+            let mut even = 0;
+            for (id, same) in groups(&material, known) {
+                even |= if self.looks.is_even(id) { same } else { 0 };
+            }
             // Others are worked out one by one: their materials too, where those are not the same everywhere.
             let mut settled = 0;
-            for lane in lanes_of(hit) {
-                let is_front = front >> lane & 1 != 0;
-                if known >> lane & 1 != 0 && self.looks.even(material[lane], is_front).is_some() {
-                    continue;
-                }
+            for lane in lanes_of(hit & !even) {
                 let surface = self.one(rays, hits, first + lane, vertices);
                 let dir = DVec3::from(rays.dir(first + lane).map(S::to_f64));
                 let is_front = surface.ng.dot(dir) <= 0.0;
                 material[lane] = surface.material;
                 front = front & !(1 << lane) | u32::from(is_front) << lane;
-                if self.looks.even(surface.material, is_front).is_none() {
+                if !self.looks.is_even(surface.material) {
                     settled |= 1 << lane;
                     self.settle(&surface, dir, first + lane, vertices);
                 }
@@ -212,16 +212,22 @@ impl<S: Real> Shader<'_, S> {
         if lanes == 0 {
             return;
         }
-        let dir: Lanes3<S::Wide> = each(|axis| S::Wide::load(&rays.dir[axis][first..]));
-        let cos = dot(vertices.vector::<S::Wide>(NORMAL, first), dir).abs() / dot(dir, dir).sqrt();
-        let cos = cos.fast_min(S::Wide::constant(1.0));
         let (mut sides, mut of_model) = ([0; MAX_LANES], [0u32; Model::COUNT]);
-        for lane in lanes_of(lanes) {
-            let Some((side, model)) = self.looks.even_side(material[lane], front >> lane & 1 != 0) else { continue };
-            sides[lane] = side;
-            of_model[model as usize] |= 1 << lane;
+        for (id, same) in groups(material, lanes) {
+            for (from_front, lanes) in [(true, same & front), (false, same & !front)] {
+                let Some((side, model)) = self.looks.even_side(id, from_front).filter(|_| lanes != 0) else { continue };
+                sides = merge(<f32x16 as Lanes>::Mask::from_bits(lanes), side, sides);
+                of_model[model as usize] |= lanes;
+            }
         }
         let LookLanes { base, param } = LookLanes::<S::Wide>::of([&self.sides, &[]], lanes, &sides);
+        let mut cos = S::Wide::constant(1.0);
+        // Only a matte surface scatters alike whatever the angle.
+        if of_model[Model::Matte as usize] != lanes {
+            let dir: Lanes3<S::Wide> = each(|axis| S::Wide::load(&rays.dir[axis][first..]));
+            let along = dot(vertices.vector::<S::Wide>(NORMAL, first), dir).abs() / dot(dir, dir).sqrt();
+            cos = along.fast_min(cos);
+        }
         for (model, lanes) in Model::ALL.into_iter().zip(of_model).filter(|(_, lanes)| *lanes != 0) {
             self.put_terms(model, base, &param, cos, (first, lanes), vertices);
         }

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::branches::Branches;
 use super::classic::refracted;
 use super::lights::Lamp;
+use super::meeting::met_lanes;
 use super::sample::Rgba;
 use super::shader::{Shader, Workspace};
 use super::spot::Spot;
@@ -42,8 +43,9 @@ impl<S: Real> Shader<'_, S> {
     ///
     /// `work.hits` are the hits of `rays`. A sample's terms are added level by level and light by light.
     pub(super) fn whitted(&self, rays: &Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut [Rgba]) {
-        for i in 0..rays.len() {
-            if !work.hits.is_hit(i) && rays.is_live(i) {
+        for first in (0..rays.padded_len()).step_by(S::Wide::N) {
+            let missed = rays.live_lanes(first) & !met_lanes(&work.hits, first);
+            for i in lanes_of(missed).map(|lane| first + lane) {
                 let behind = self.beyond(DVec3::from(rays.dir(i).map(S::to_f64)));
                 out[i].radiance = behind;
                 // A background that shines is part of the picture; a black one stays transparent.
@@ -179,9 +181,9 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
         next.push(lanes, &carried.path[first..], [vertices.enter(first), dir, throughput], S::INFINITY);
     }
     next.close();
-    let count = |i: &usize| next.rays.is_live(*i);
-    work.rays.mirror += (0..count_mirrored).filter(count).count() as u64;
-    work.rays.refracted += (count_mirrored..next.len()).filter(count).count() as u64;
+    let mirrored = next.rays.live_among(count_mirrored);
+    work.rays.mirror += mirrored as u64;
+    work.rays.refracted += (next.rays.live_count() - mirrored) as u64;
 }
 
 fn radiance<S: Real>(color: [S; 3]) -> DVec3 {

@@ -123,7 +123,7 @@ pub fn picture<S: Engines>(d: &Description, camera: &Camera, options: &RenderOpt
 pub fn values<'a>(film: &'a Film, plane: &str) -> &'a [f32] {
     match &film.planes.iter().find(|p| p.name == plane).expect("the plane").data {
         PlaneData::F32(data) => data,
-        PlaneData::U32(_) => panic!("{plane} holds integers"),
+        PlaneData::U32(_) | PlaneData::U8(_) => panic!("{plane} holds integers"),
     }
 }
 

@@ -16,6 +16,7 @@ fn film(width: u32, height: u32, window: Window) -> Film {
         film.push(name, PlaneData::F32((0..n).map(value).collect())).unwrap();
     }
     film.push("id.instance", PlaneData::U32((0..n as u32).map(|i| !i).collect())).unwrap();
+    film.push("level", PlaneData::U8((0..n).map(|i| i as u8).collect())).unwrap();
     film
 }
 
@@ -44,6 +45,7 @@ fn planes_windows_and_special_values_survive() {
             match &f.plane(name).unwrap().data {
                 PlaneData::F32(v) => v.iter().map(|x| x.to_bits()).collect(),
                 PlaneData::U32(v) => v.clone(),
+                PlaneData::U8(v) => v.iter().map(|&level| (f32::from(level) / 255.0).to_bits()).collect(),
             }
         };
         for plane in &film.planes {

@@ -153,7 +153,7 @@ impl<'a, 'film: 'a> WritableSamples<'a> for Samples<'film> {
 
     fn sample_type(&self) -> SampleType {
         match self.data {
-            PlaneData::F32(_) => SampleType::F32,
+            PlaneData::F32(_) | PlaneData::U8(_) => SampleType::F32,
             PlaneData::U32(_) => SampleType::U32,
         }
     }
@@ -179,6 +179,10 @@ impl SamplesWriter for LineCopy<'_> {
         match self.data {
             PlaneData::F32(v) => line.write_samples_from_slice(&v[range]),
             PlaneData::U32(v) => line.write_samples_from_slice(&v[range]),
+            PlaneData::U8(v) => {
+                let values: Vec<f32> = v[range].iter().map(|&level| f32::from(level) / 255.0).collect();
+                line.write_samples_from_slice(&values)
+            }
         }
         .expect("a line of memory takes exactly its own samples");
     }

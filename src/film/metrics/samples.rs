@@ -94,14 +94,14 @@ pub struct PlaneDifference {
     /// Errors in the plane's own unit.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Largest distance: representable f32 between the two, or for numbers (ids) their difference.
+    /// Largest distance: representable f32 between the two, or for numbers (ids) and levels their difference.
     pub max_ulp: u64,
     /// Counts by distance.
     pub classes: Classes,
 }
 
-/// Compares two planes of the same length sample by sample; `None` if one holds floats and the other numbers, or if their
-/// lengths differ.
+/// Compares two planes of the same length sample by sample; `None` if they hold different kinds, or if their lengths
+/// differ.
 pub fn plane_difference(name: &str, a: &PlaneData, b: &PlaneData) -> Option<PlaneDifference> {
     if a.len() != b.len() {
         return None;
@@ -117,6 +117,9 @@ pub fn plane_difference(name: &str, a: &PlaneData, b: &PlaneData) -> Option<Plan
             a.iter().zip(b).for_each(|(&x, &y)| add(x.into(), y.into(), ulp_distance(x, y)));
         }
         (PlaneData::U32(a), PlaneData::U32(b)) => {
+            a.iter().zip(b).for_each(|(&x, &y)| add(x.into(), y.into(), x.abs_diff(y).into()));
+        }
+        (PlaneData::U8(a), PlaneData::U8(b)) => {
             a.iter().zip(b).for_each(|(&x, &y)| add(x.into(), y.into(), x.abs_diff(y).into()));
         }
         _ => return None,

@@ -8,7 +8,7 @@ use super::header::{self, Descr, Header};
 use crate::error::{Error, Result};
 use crate::film::{Film, PlaneData, write_atomically};
 
-/// Reads a 2-D array of `<f4` or `<u4` as (width, height, samples).
+/// Reads a 2-D array of `<f4`, `<u4` or `|u1` as (width, height, samples).
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] with a byte offset if the file is no such array or its length does not fit.
@@ -34,27 +34,38 @@ fn plane(file: &Path, mut reader: impl Read, len: u64) -> Result<(u32, u32, Plan
     Ok((width, height, samples(file, reader, &header, len)?))
 }
 
-/// The numbers of an array of `<f4` or `<u4`, in C order.
+/// The numbers of an array of `<f4`, `<u4` or `|u1`, in C order.
 fn samples(file: &Path, reader: impl Read, header: &Header, len: u64) -> Result<PlaneData> {
-    let is_float = match &header.descr {
-        Descr::Plain(format) if format == "<f4" => true,
-        Descr::Plain(format) if format == "<u4" => false,
-        _ => return Err(header.wrong_descr(file, "'<f4' or '<u4': a plane")),
+    let format = match &header.descr {
+        Descr::Plain(format) if ["<f4", "<u4", "|u1"].contains(&format.as_str()) => format,
+        _ => return Err(header.wrong_descr(file, "'<f4', '<u4' or '|u1': a plane")),
     };
     header.require_c_order(file)?;
+    if format == "|u1" {
+        let count = header.count(file, 1, len)?;
+        let mut levels = Vec::with_capacity(count);
+        each_record(file, reader, count, 1, |_, record| {
+            levels.extend(record);
+            Ok(())
+        })?;
+        return Ok(PlaneData::U8(levels));
+    }
     let count = header.count(file, 4, len)?;
     let mut bits = Vec::with_capacity(count);
     each_record(file, reader, count, 4, |_, record| {
         bits.push(u32_at(record, 0));
         Ok(())
     })?;
-    Ok(if is_float { PlaneData::F32(bits.into_iter().map(f32::from_bits).collect()) } else { PlaneData::U32(bits) })
+    Ok(match format.as_str() {
+        "<f4" => PlaneData::F32(bits.into_iter().map(f32::from_bits).collect()),
+        _ => PlaneData::U32(bits),
+    })
 }
 
 /// Most planes in one array.
 const MAX_PLANES: u64 = 256;
 
-/// Reads a 2-D array of `<f4` or `<u4` as a film of the plane `Y`, or a 3-D one, whose last axis is planes, as `R G B` (three),
+/// Reads a 2-D array of `<f4`, `<u4` or `|u1` as a film of the plane `Y`, or a 3-D one, whose last axis is planes, as `R G B` (three),
 /// `R G B A` (four) or `0 1 2 ...`.
 ///
 /// # Errors
@@ -92,6 +103,7 @@ fn film(file: &Path, mut reader: impl Read, len: u64) -> Result<Film> {
         let plane = match &data {
             PlaneData::F32(v) => PlaneData::F32(v.iter().skip(i).step_by(step).copied().collect()),
             PlaneData::U32(v) => PlaneData::U32(v.iter().skip(i).step_by(step).copied().collect()),
+            PlaneData::U8(v) => PlaneData::U8(v.iter().skip(i).step_by(step).copied().collect()),
         };
         film.push(name, plane)?;
     }
@@ -126,6 +138,7 @@ pub fn write_plane(path: &Path, width: u32, height: u32, data: &PlaneData) -> Re
     let format = match data {
         PlaneData::F32(_) => "<f4",
         PlaneData::U32(_) => "<u4",
+        PlaneData::U8(_) => "|u1",
     };
     let head = header::bytes(&Descr::Plain(format.to_owned()), &[u64::from(height), u64::from(width)]);
     write_atomically(path, |w| {
@@ -133,6 +146,7 @@ pub fn write_plane(path: &Path, width: u32, height: u32, data: &PlaneData) -> Re
         match data {
             PlaneData::F32(v) => v.iter().try_for_each(|x| w.write_all(&x.to_le_bytes())),
             PlaneData::U32(v) => v.iter().try_for_each(|x| w.write_all(&x.to_le_bytes())),
+            PlaneData::U8(v) => w.write_all(v),
         }
     })
 }

@@ -101,7 +101,11 @@ fn occlusion_and_planes_survive() {
     let what = parse_occlusion(Path::new("o"), &two).unwrap_err().to_string();
     assert_eq!(what, format!("o: byte {}: expected 0 or 1, found 2", two.len() - 1));
 
-    for data in [PlaneData::F32((0..6).map(|i| i as f32 / 4.0).collect()), PlaneData::U32(vec![0, 1, 2, 3, 4, !0])] {
+    for data in [
+        PlaneData::F32((0..6).map(|i| i as f32 / 4.0).collect()),
+        PlaneData::U32(vec![0, 1, 2, 3, 4, !0]),
+        PlaneData::U8(vec![0, 1, 2, 3, 254, 255]),
+    ] {
         write_plane(&path, 3, 2, &data).unwrap();
         assert_eq!(read_plane(&path).unwrap(), (3, 2, data.clone()));
         assert!(write_plane(&path, 2, 2, &data).is_err());

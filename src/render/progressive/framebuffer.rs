@@ -85,6 +85,7 @@ impl Framebuffer {
                 match &mut plane.data {
                     PlaneData::F32(data) => shown.iter().for_each(|&(to, from)| data[to] = data[from]),
                     PlaneData::U32(data) => shown.iter().for_each(|&(to, from)| data[to] = data[from]),
+                    PlaneData::U8(data) => shown.iter().for_each(|&(to, from)| data[to] = data[from]),
                 }
             }
         }
@@ -96,7 +97,7 @@ impl Framebuffer {
 mod tests {
     use glam::DVec3;
 
-    use super::super::super::patch::{Layout, channels, empty_film};
+    use super::super::super::patch::{Channels, Layout, empty_film};
     use super::super::super::sums::Finished;
     use super::*;
     use crate::shade::{Rgba, Samples};
@@ -104,7 +105,7 @@ mod tests {
     #[test]
     fn the_smallest_block_with_a_colour_is_shown() {
         let window = Window { x0: 3, y0: 5, x1: 12, y1: 14 };
-        let channels = channels(&[]);
+        let channels = Channels::new(&Default::default());
         let mut frame = Framebuffer::new(empty_film((20, 20), window, &channels), 8);
         let mut patch = Patch::default();
         let mut put = |frame: &mut Framebuffer, pixel, value| {

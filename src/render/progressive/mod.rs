@@ -23,10 +23,10 @@ use rayon::prelude::*;
 pub use framebuffer::Framebuffer;
 pub use steps::{LARGEST_BLOCK, Step};
 
-use super::aov::{Aov, Channel};
+use super::aov::Aov;
 use super::canvas::{Canvas, Memory};
 use super::options::{Progress, RenderOptions, rect_of};
-use super::patch::{Layout, channels, empty_film};
+use super::patch::{Channels, Layout, empty_film};
 use super::scheduler::RenderOutput;
 use super::sums::{Finished, Sums};
 use super::tally::Tally;
@@ -61,7 +61,7 @@ pub struct Progressive<'a, S: Real> {
     start: u32,
     /// Tiles of the window, and what is known of each.
     tiles: Vec<(u32, Mutex<Tile>)>,
-    channels: Vec<Channel>,
+    channels: Channels,
     frame: Mutex<Framebuffer>,
     /// Batches of all steps.
     total: u64,
@@ -131,9 +131,12 @@ impl<'a, S: Real> Progressive<'a, S> {
         if options.aovs.contains(&Aov::Cryptomatte) {
             return Err(Error::Usage("cryptomattes are not made by blocks: leave --preview and --blocks out".into()));
         }
+        if options.levels.is_some() {
+            return Err(Error::Usage("pictures by blocks are made of floats, not of levels".into()));
+        }
         let settings = options.settings();
         let start = if settings.cost || !engine.is_exact() { 1 } else { start };
-        let channels = channels(&options.aovs);
+        let channels = Channels::new(options);
         let film = empty_film((options.width, options.height), window, &channels);
         let shader = Shader::new(world, description, engine, headlight(camera), settings).with_rt(description, camera);
         let rect = rect_of(window);

@@ -59,8 +59,8 @@ impl<S: Real> Wave<S> {
         [pdf, squeeze]: [S::Wide; 2],
     ) {
         let first = self.path.len();
-        self.path.extend(chosen.iter().map(|lane| path[lane]));
-        self.rays.put(first, chosen, [org, dir], S::Wide::splat(S::INFINITY));
+        chosen.extend(path, &mut self.path);
+        self.rays.put(first, chosen, [org, dir], [S::ZERO, S::INFINITY].map(S::Wide::splat));
         let [r, g, b] = throughput;
         let numbers = [r, g, b, pdf, squeeze];
         self.columns().into_iter().zip(numbers).for_each(|(column, x)| chosen.pack(x, &mut column[first..]));
@@ -120,8 +120,8 @@ impl<S: Real> Shadows<S> {
     #[inline(always)]
     pub fn push(&mut self, chosen: &Chosen, path: &[u32], [org, dir, light]: [Lanes3<S::Wide>; 3], t_max: S::Wide) {
         let first = self.path.len();
-        self.path.extend(chosen.iter().map(|lane| path[lane]));
-        self.rays.put(first, chosen, [org, dir], t_max);
+        chosen.extend(path, &mut self.path);
+        self.rays.put(first, chosen, [org, dir], [S::Wide::splat(S::ZERO), t_max]);
         self.light.iter_mut().zip(light).for_each(|(column, x)| chosen.pack(x, &mut column[first..]));
     }
 

@@ -7,7 +7,7 @@ use crate::lanes::chosen::{at, lanes_of, spill};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3, space};
 use crate::ray::{Hits, Rays};
 use crate::scene::world::World;
-use crate::shade::sample::Samples;
+use crate::shade::sample::{Rgba, Samples};
 
 /// Roundings of a point on a surface that a ray from there may still meet the surface within.
 const ROUNDINGS: f64 = 64.0;
@@ -99,12 +99,20 @@ impl<S: Real> Level<S> {
         [live, live & self.within.get(k).copied().unwrap_or(0)]
     }
 
-    /// Adds what rays `first + lane` of `lanes` show, each its own of `color`, to their pixels.
+    /// Whether the rays are the primary ones.
+    pub fn is_primary(&self) -> bool {
+        self.carry.is_empty()
+    }
+
+    /// Adds what rays `first + lane` of `lanes` show, each its own of `color`, to their pixels. Primary rays, which show
+    /// something once at most, make theirs opaque.
     #[inline]
     pub fn show(&self, first: usize, lanes: u32, color: Lanes3<S::Wide>, out: &mut Samples) {
         let color = spill(color);
         let color = |lane: usize| DVec3::from(map3(at(&color, lane % MAX_LANES), S::to_f64));
-        if !self.carry.is_empty() {
+        // 0 + -0 is 0, as in a sum.
+        let alone = |lane: usize| Rgba { radiance: DVec3::ZERO + color(lane), alpha: 1.0 };
+        if !self.is_primary() {
             for lane in lanes_of(lanes) {
                 let carry = &self.carry[first + lane];
                 out.colors[carry.pixel as usize].radiance += carry.throughput * color(lane);
@@ -112,9 +120,9 @@ impl<S: Real> Level<S> {
         } else if lanes == S::Wide::ALL {
             // Primary rays, each with a pixel of its own: a loop of known length.
             let pixels = &mut out.colors[first..first + S::Wide::N];
-            pixels.iter_mut().enumerate().for_each(|(lane, pixel)| pixel.radiance += color(lane));
+            pixels.iter_mut().enumerate().for_each(|(lane, pixel)| *pixel = alone(lane));
         } else {
-            lanes_of(lanes).for_each(|lane| out.colors[first + lane].radiance += color(lane));
+            lanes_of(lanes).for_each(|lane| out.colors[first + lane] = alone(lane));
         }
     }
 

@@ -32,7 +32,7 @@ use self::shadow::Probes;
 use super::sample::{FirstHit, Rgba, Samples};
 use super::shader::{Shader, Workspace};
 use crate::camera::Camera;
-use crate::lanes::{Lanes, Real};
+use crate::lanes::Real;
 use crate::ray::Rays;
 use crate::scene::assembly::AssemblyObject;
 use crate::scene::brlcad::describe::Looks;
@@ -41,6 +41,8 @@ use pattern::Pattern;
 
 /// Surfaces nearer than this along a ray, mm, are behind it.
 const TOLERANCE: f64 = 0.0005;
+/// Colours with nothing above this, which is more than one and a half steps of a byte, may look like the background.
+const DARK: f64 = 1.6 / 255.0;
 /// What leaves the scene: as dark as a byte of blue can be without being black.
 const BACKGROUND: DVec3 = DVec3::new(0.0, 0.0, 1.0 / 255.0);
 /// Light everywhere, as seen from the eye.
@@ -120,8 +122,8 @@ pub(super) struct Memory<S> {
     lost: Vec<u32>,
     /// Those of them that are inside something without end.
     inside: Vec<u32>,
-    /// Of each vector of primary rays: the live ones, and those that met something.
-    first: Vec<[u32; 2]>,
+    /// Primary rays that met something and may look like the background.
+    dark: Vec<u32>,
 }
 
 impl Rt {
@@ -140,6 +142,7 @@ impl<S: Real> Shader<'_, S> {
     pub(super) fn rt(&self, rt: &Rt, rays: &mut Rays<S>, work: &mut Workspace<S>, out: &mut Samples) {
         let mut memory = std::mem::take(&mut work.rt);
         memory.level.start(rays);
+        memory.dark.clear();
         let mut next = Vec::new();
         let mut is_primary = true;
         while memory.level.len() > 0 {
@@ -148,10 +151,7 @@ impl<S: Real> Shader<'_, S> {
             if !is_primary {
                 work.rays.mirror += memory.level.len() as u64;
             } else {
-                let Memory { first, found, level, .. } = &mut memory;
-                first.clear();
-                first.extend(found.hit.iter().enumerate().map(|(k, &hit)| [level.lanes(k)[0], hit]));
-                see(found, &mut out.hits);
+                see(&memory.found, &mut out.hits);
             }
             self.rt_sort(rt, &mut memory, &work.hits, &mut next, out);
             self.rt_lost(rt, &mut memory, work, out);
@@ -163,14 +163,7 @@ impl<S: Real> Shader<'_, S> {
             next.clear();
             is_primary = false;
         }
-        for (pixels, &[live, hit]) in out.colors.chunks_mut(S::Wide::N).zip(&memory.first) {
-            for (lane, pixel) in pixels.iter_mut().enumerate() {
-                pixel.alpha = f64::from(live >> lane & 1);
-                if hit >> lane & 1 != 0 {
-                    not_the_background(pixel);
-                }
-            }
-        }
+        memory.dark.iter().for_each(|&pixel| not_the_background(&mut out.colors[pixel as usize]));
         work.rt = memory;
     }
 }
@@ -186,12 +179,8 @@ fn see<S: Real>(found: &Found<S>, out: &mut [FirstHit]) {
 
 /// `rt` keeps the background's colour for the background: a hit of that very colour becomes one step bluer.
 fn not_the_background(seen: &mut Rgba) {
-    let color = seen.radiance;
-    // Most are brighter.
-    if color.max_element() * 255.0 < 1.5 {
-        let byte = |x: f64| (x * 255.0 + 0.5) as u8;
-        if [color.x, color.y, color.z].map(byte) == [0, 0, 1] {
-            seen.radiance = DVec3::new(0.0, 0.0, 2.0 / 255.0);
-        }
+    let byte = |x: f64| (x * 255.0 + 0.5) as u8;
+    if seen.radiance.to_array().map(byte) == [0, 0, 1] {
+        seen.radiance = DVec3::new(0.0, 0.0, 2.0 / 255.0);
     }
 }

@@ -8,9 +8,9 @@ use super::level::{Found, Level, vector};
 use super::material::Finish;
 use super::meetings::Meetings;
 use super::shadow::Probes;
-use super::{AIR, AMBIENT, MAX_BOUNCES, Memory, Path, Rt, TOLERANCE, Within};
+use super::{AIR, AMBIENT, DARK, MAX_BOUNCES, Memory, Path, Rt, TOLERANCE, Within};
 use crate::lanes::chosen::lanes_of;
-use crate::lanes::{LaneMask, Lanes, Real, dot, each, space};
+use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, space};
 use crate::shade::sample::Samples;
 use crate::shade::shader::{Shader, Workspace};
 
@@ -24,7 +24,7 @@ impl<S: Real> Shader<'_, S> {
         work: &mut Workspace<S>,
         out: &mut Samples,
     ) {
-        let Memory { level, found, meetings, probes, next_probes, shadow, .. } = memory;
+        let Memory { level, found, meetings, probes, next_probes, shadow, dark, .. } = memory;
         unlit(rt, level, found, meetings);
         for lamp in rt.lamps.iter().rev() {
             let padded = meetings.padded();
@@ -48,7 +48,14 @@ impl<S: Real> Shader<'_, S> {
                 (0..3).for_each(|axis| meetings.color[axis][i] = S::from_f64(shown[axis]));
             }
             if kinds.entering != 0 {
-                level.show(first, kinds.entering, vector(&meetings.color, first), out);
+                let color: Lanes3<S::Wide> = vector(&meetings.color, first);
+                level.show(first, kinds.entering, color, out);
+                if level.is_primary() {
+                    // What comes back from mirrors and glass makes them no darker.
+                    let [r, g, b] = color;
+                    let is_dark = r.fast_max(g).fast_max(b).cmp_lt(S::Wide::constant(DARK)).bits();
+                    dark.extend(lanes_of(is_dark & kinds.entering).map(|lane| (first + lane) as u32));
+                }
             }
         }
     }

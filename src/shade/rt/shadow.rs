@@ -13,57 +13,70 @@ const THIN_AT_START: f64 = 0.005;
 /// Light weaker than this is dark.
 const DARK: f64 = 0.01;
 
-/// What a shadow ray carries.
+/// What a shadow ray carries that has passed through something.
 #[derive(Clone, Copy, Debug)]
-struct Probe {
-    /// Number of the ray whose hit it starts from.
-    slot: u32,
+struct Passed {
     /// What still passes.
     filter: f64,
     /// The region that the ray is passing through.
     within: Option<u32>,
 }
 
+impl Passed {
+    const NOTHING: Self = Self { filter: 1.0, within: None };
+}
+
 /// What a probe's next surface means.
 enum Verdict {
     Arrives,
     Dark,
-    GoesOn(Probe),
+    GoesOn(Passed),
 }
 
 /// Shadow rays on their way to one light.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Probes<S> {
     rays: Rays<S>,
-    carry: Vec<Probe>,
+    count: usize,
+    /// Numbers of the rays whose hits they start from; more than there are rays.
+    slots: Vec<u32>,
+    /// Parallel to the rays; none while they come straight from surfaces.
+    passed: Vec<Passed>,
 }
 
 impl<S: Real> Probes<S> {
-    /// None, with room for `count`; [`Self::close`] ends the additions.
-    pub fn open(&mut self, count: usize) {
-        self.rays.open(count);
-        self.carry.clear();
+    /// None, with room for `room`; [`Self::close`] ends the additions.
+    pub fn open(&mut self, room: usize) {
+        self.rays.open(room);
+        self.count = 0;
+        self.passed.clear();
+        // Lanes are written a vector at a time.
+        if self.slots.len() < room + MAX_LANES {
+            self.slots.resize(room + MAX_LANES, 0);
+        }
     }
 
     /// Adds those of `lanes` from hits `first + lane`, towards the light at the unit directions `dir`; `org` is the tolerance
     /// away from the hits.
     #[inline]
     pub fn push(&mut self, first: usize, lanes: u32, org: Lanes3<S::Wide>, dir: Lanes3<S::Wide>) {
-        let (chosen, at) = (Chosen::of(lanes), self.carry.len());
+        let (chosen, at) = (Chosen::of(lanes), self.count);
         let from = start(org) - S::Wide::constant(TOLERANCE);
-        self.rays.put(at, &chosen, [org, dir], S::Wide::splat(S::INFINITY));
-        chosen.pack(from, &mut self.rays.t_min[at..]);
-        self.carry.extend(chosen.iter().map(|lane| Probe { slot: (first + lane) as u32, filter: 1.0, within: None }));
+        self.rays.put(at, &chosen, [org, dir], [from, S::Wide::splat(S::INFINITY)]);
+        self.slots[at..at + MAX_LANES].copy_from_slice(&chosen.numbers(first as u32));
+        self.count += chosen.count();
     }
 
-    fn add(&mut self, probe: Probe, org: [S; 3], dir: [S; 3], from: S) {
-        self.rays.set(self.carry.len(), org, dir, from, S::INFINITY);
-        self.carry.push(probe);
+    fn add(&mut self, slot: u32, passed: Passed, org: [S; 3], dir: [S; 3], from: S) {
+        self.rays.set(self.count, org, dir, from, S::INFINITY);
+        self.slots[self.count] = slot;
+        self.passed.push(passed);
+        self.count += 1;
     }
 
     /// Ends the additions.
     pub fn close(&mut self) {
-        self.rays.close(self.carry.len());
+        self.rays.close(self.count);
     }
 }
 
@@ -80,54 +93,52 @@ impl<S: Real> Shader<'_, S> {
         work: &mut Workspace<S>,
     ) {
         let tolerance = S::from_f64(TOLERANCE);
-        let mut is_first = true;
-        while !probes.carry.is_empty() {
-            work.rays.shadow += probes.carry.len() as u64;
+        while probes.count > 0 {
+            work.rays.shadow += probes.count as u64;
             self.intersect_all(&probes.rays, work);
             found.open(probes.rays.padded_len());
-            next.open(probes.carry.len());
+            next.open(probes.count);
             for k in 0..found.hit.len() {
                 // A light is a thing: a ray that meets nothing has missed it.
                 let first = k * S::Wide::N;
                 let (hit, regions) = self.world.met_parts(&work.hits, first);
                 let mut rest = hit;
-                if is_first {
-                    rest &= !simple_verdicts(rt, first, hit, &regions, probes, &work.hits.t, visible);
+                if probes.passed.is_empty() {
+                    let slots = &probes.slots[first..];
+                    rest &= !simple_verdicts(rt, hit, &regions, slots, &work.hits.t[first..], visible);
                 }
                 if rest != 0 {
                     found.set_vector(k, self.world, &probes.rays, &work.hits);
                 }
                 for i in lanes_of(rest).map(|lane| first + lane) {
-                    let probe = &probes.carry[i];
-                    match judge(rt, probe, i, found) {
-                        Verdict::Arrives => visible[probe.slot as usize] = S::from_f64(probe.filter),
+                    let (slot, passed) = (probes.slots[i], probes.passed.get(i).copied().unwrap_or(Passed::NOTHING));
+                    match judge(rt, passed, i, found) {
+                        Verdict::Arrives => visible[slot as usize] = S::from_f64(passed.filter),
                         Verdict::Dark => {}
                         Verdict::GoesOn(on) => {
-                            next.add(on, probes.rays.org(i), probes.rays.dir(i), found.t[i] + tolerance);
+                            next.add(slot, on, probes.rays.org(i), probes.rays.dir(i), found.t[i] + tolerance);
                         }
                     }
                 }
             }
             next.close();
             std::mem::swap(probes, next);
-            is_first = false;
         }
     }
 }
 
-/// Of probes `lanes` that come straight from a surface and have met something, in `regions`, those for which it makes no
-/// difference which side of it: they have met lights, and arrive, or what nothing passes through.
+/// Of probes `lanes` that come straight from the surfaces of `slots` and have met something, in `regions` and at `t`, those for
+/// which it makes no difference which side of it: they have met lights, and arrive, or what nothing passes through.
 #[inline]
 fn simple_verdicts<S: Real>(
     rt: &Rt,
-    first: usize,
     lanes: u32,
     regions: &[u32; MAX_LANES],
-    probes: &Probes<S>,
+    slots: &[u32],
     t: &[S],
     visible: &mut [S],
 ) -> u32 {
-    let is_far = S::Wide::constant(THIN_AT_START).cmp_le(S::Wide::load(&t[first..]));
+    let is_far = S::Wide::constant(THIN_AT_START).cmp_le(S::Wide::load(t));
     let (mut rest, mut simple) = (lanes & is_far.bits(), 0);
     while rest != 0 {
         let region = regions[rest.trailing_zeros() as usize % MAX_LANES];
@@ -135,9 +146,7 @@ fn simple_verdicts<S: Real>(
         rest &= !same;
         let material = &rt.materials[region as usize];
         if material.is_light {
-            for probe in lanes_of(same).map(|lane| &probes.carry[first + lane]) {
-                visible[probe.slot as usize] = S::from_f64(probe.filter);
-            }
+            lanes_of(same).for_each(|lane| visible[slots[lane] as usize] = S::ONE);
         }
         if material.is_light || material.finish.is_none_or(|finish| finish.transmit <= 0.0) {
             simple |= same;
@@ -146,18 +155,18 @@ fn simple_verdicts<S: Real>(
     simple
 }
 
-fn judge<S: Real>(rt: &Rt, probe: &Probe, i: usize, found: &Found<S>) -> Verdict {
+fn judge<S: Real>(rt: &Rt, passed: Passed, i: usize, found: &Found<S>) -> Verdict {
     let (t, region, leaving) = (found.t[i].to_f64(), found.region[i], found.is_leaving(i));
-    if leaving && (probe.within == Some(region) || t < THIN_AT_START) {
-        return Verdict::GoesOn(Probe { within: None, ..*probe });
+    if leaving && (passed.within == Some(region) || t < THIN_AT_START) {
+        return Verdict::GoesOn(Passed { within: None, ..passed });
     }
     let material = &rt.materials[region as usize];
     if material.is_light {
         return Verdict::Arrives;
     }
-    let filter = probe.filter * material.finish.map_or(0.0, |finish| finish.transmit);
+    let filter = passed.filter * material.finish.map_or(0.0, |finish| finish.transmit);
     if filter < DARK {
         return Verdict::Dark;
     }
-    Verdict::GoesOn(Probe { filter, within: (!leaving).then_some(region), ..*probe })
+    Verdict::GoesOn(Passed { filter, within: (!leaving).then_some(region) })
 }

@@ -23,7 +23,7 @@ impl<S: Real> Shader<'_, S> {
         next: &mut Vec<Path>,
         out: &mut Samples,
     ) {
-        let Memory { level, found, meetings, lost, .. } = memory;
+        let Memory { level, found, meetings, lost, dark, .. } = memory;
         let padded = level.rays.padded_len();
         meetings.open(padded);
         lost.clear();
@@ -32,7 +32,13 @@ impl<S: Real> Shader<'_, S> {
             lanes_of(within).for_each(|lane| glass::step(level, first + lane, found, next));
             let (free, hit, leaving) = (live & !within, found.hit[k], found.leaving[k]);
             lost.push(free & !hit);
-            lanes_of(free & leaving).for_each(|lane| leave(level, first + lane, found, next, out));
+            for i in lanes_of(free & leaving).map(|lane| first + lane) {
+                if level.is_primary() {
+                    out.colors[i].alpha = 1.0;
+                    dark.push(i as u32);
+                }
+                leave(level, i, found, next, out);
+            }
             meetings.add(rt, self.world, found, &hits.prim, first, free & hit & !leaving);
         }
     }

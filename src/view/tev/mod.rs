@@ -88,7 +88,7 @@ impl Tev {
     fn update(&self, film: &Film, part: Window, shown: impl Fn(u32, u32) -> Option<usize>) -> Vec<u8> {
         let value = |channel: usize, x: u32, y: u32| match &film.planes[self.channels[channel].0].data {
             PlaneData::F32(plane) => shown(x, y).map_or(0.0, |index| plane[index]),
-            PlaneData::U32(_) => 0.0,
+            PlaneData::U32(_) | PlaneData::U8(_) => 0.0,
         };
         update_image(&self.name, &self.names(), part, value)
     }
