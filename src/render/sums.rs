@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::pixels::{Pixel, brightness};
 use crate::camera::Passes;
+use crate::lanes::f64x4;
 use crate::shade::{FirstHit, Rgba, Samples};
 
 /// Sums of the samples of pixels. What only further planes show is not kept where there are none.
@@ -91,17 +92,14 @@ impl Finished<'_> {
     #[inline]
     pub fn colors<const N: usize>(&self, numbers: &[u32], rows: &mut [[f32; N]; 4]) {
         let mut put = |k: usize, Rgba { radiance: DVec3 { x, y, z }, alpha }: Rgba| {
-            // Four numbers converted at once.
-            let four = [x, y, z, alpha].map(|value| value as f32);
+            // 0 + -0 is 0, as in a sum. Four numbers at once.
+            let four = f64x4::new([x, y, z, alpha]) + f64x4::ZERO;
+            let four = four.to_array().map(|value| value as f32);
             (0..4).for_each(|channel| rows[channel][k] = four[channel]);
         };
         let places = (0..N).zip(numbers);
         match self {
-            // 0 + -0 is 0, as in a sum.
-            Self::Samples(samples) => places.for_each(|(k, &i)| {
-                let Rgba { radiance, alpha } = samples.colors[i as usize];
-                put(k, Rgba { radiance: DVec3::ZERO + radiance, alpha: 0.0 + alpha });
-            }),
+            Self::Samples(samples) => places.for_each(|(k, &i)| put(k, samples.colors[i as usize])),
             Self::Sums(sums, count) => places.for_each(|(k, &i)| put(k, mean(&sums.colors[i as usize], *count))),
         }
     }

@@ -128,7 +128,7 @@ fn a_header_that_claims_too_much_is_refused_before_memory_is_taken() {
     // x_max: eight rows of fifty million pixels, 14 GB of planes. (The number of chunks depends on y alone.)
     bytes[at + 8..at + 12].copy_from_slice(&49_999_999_i32.to_le_bytes());
     let what = parse_bytes(&bytes).unwrap_err().to_string();
-    assert!(what.contains("claims 50000000x8 pixels of 9 channels"), "{what}");
+    assert!(what.contains("claims 50000000x8 pixels of 10 channels"), "{what}");
 }
 
 #[test]

@@ -19,11 +19,12 @@ const MAX_FACETS: usize = 1 << 20;
 /// Numbers of a facet.
 const FIELDS: usize = 18;
 
-/// Outward normal of a face, not unit: `rows * (p - centre) + constant`.
+/// Outward normal of a face: `rows * (p - centre) + constant`, not unit; of a flat one the constant, unit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facet<S> {
     /// Three rows, the centre, the constant, and the magnitude (see [`super::Surface::magnitude`]).
     fields: [S; FIELDS],
+    is_flat: bool,
 }
 
 impl<S: Real> Facet<S> {
@@ -46,7 +47,12 @@ impl<S: Real> Facet<S> {
         for (field, x) in fields.iter_mut().zip(all.iter().flat_map(DVec3::to_array)) {
             *field = S::from_f64(x);
         }
-        fields.iter().all(|x| x.is_finite()).then_some(Self { fields })
+        let is_flat = rows == DMat3::ZERO;
+        if is_flat {
+            let unit = space::normalize([fields[12], fields[13], fields[14]]);
+            fields[12..15].copy_from_slice(&unit);
+        }
+        fields.iter().all(|x| x.is_finite()).then_some(Self { fields, is_flat })
     }
 
     /// Three of the numbers, from `3 row` on, the same in all lanes.
@@ -55,7 +61,7 @@ impl<S: Real> Facet<S> {
         each(|k| V::splat(self.fields[3 * row + k]))
     }
 
-    /// Outward normals at the points `position`, not unit.
+    /// Outward normals at the points `position`, not unit, of one that is not flat.
     #[inline(always)]
     fn outward<V: Lanes<Scalar = S>>(&self, position: Lanes3<V>) -> Lanes3<V> {
         let from = space::sub(position, self.row(3));
@@ -188,6 +194,8 @@ impl<S: Real> World<S> {
         met.position = each(|axis| dir[axis].mul_add(t, org[axis]));
         let faces = S::Wide::load(&hits.u[first..]);
         let mut outward = zero;
+        // Lanes whose normals are not unit yet.
+        let mut curved = 0;
         let mut left = met.hit;
         while left != 0 {
             // Lanes that share a facet.
@@ -206,9 +214,13 @@ impl<S: Real> World<S> {
                     if !ALL {
                         met.magnitude = space::choose(mask, facet.row(5), met.magnitude);
                     }
-                    facet.outward(met.position)
+                    curved |= if facet.is_flat { 0 } else { same };
+                    if facet.is_flat { facet.row(4) } else { facet.outward(met.position) }
                 }
-                None if ALL => self.not_affine(rays, hits, first, same, met.position),
+                None if ALL => {
+                    curved |= same;
+                    self.not_affine(rays, hits, first, same, met.position)
+                }
                 None => {
                     met.hit &= !same;
                     continue;
@@ -217,9 +229,13 @@ impl<S: Real> World<S> {
             outward = space::choose(mask, normal, outward);
         }
         let turned = S::Wide::constant(0.5).cmp_lt(S::Wide::load(&hits.v[first..]));
-        let length = dot(outward, outward).sqrt();
-        let scale = S::Wide::constant(1.0) / S::Wide::select(turned, -length, length);
-        met.normal = space::scale(outward, scale);
+        let one = S::Wide::constant(1.0);
+        let mut scale = one;
+        if curved != 0 {
+            let curved = <S::Wide as Lanes>::Mask::from_bits(curved);
+            scale = S::Wide::select(curved, one / dot(outward, outward).sqrt(), one);
+        }
+        met.normal = space::scale(outward, S::Wide::select(turned, -scale, scale));
         met
     }
 

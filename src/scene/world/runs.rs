@@ -111,7 +111,11 @@ impl Runs {
     #[inline]
     pub fn find(&self, prim: u32) -> (usize, Run) {
         let cell = (prim >> self.shift) as usize;
-        let (low, high) = (self.starts[cell] as usize, self.starts[cell + 1] as usize);
+        let low = self.starts[cell] as usize;
+        if self.shift == 0 {
+            return (low, self.list[low]);
+        }
+        let high = self.starts[cell + 1] as usize;
         let after = self.list[low + 1..=high].partition_point(|run| run.first <= prim);
         (low + after, self.list[low + after])
     }

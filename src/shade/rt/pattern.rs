@@ -94,14 +94,12 @@ fn cloud<V: Lanes>(u: V, v: V) -> Lanes3<V> {
 fn texture<V: Lanes>(x: V, y: V) -> V {
     let number = V::constant;
     let (mut fx, mut fy) = (TAU * 2.0, TAU);
-    let mut px = number(FRAC_PI_2) * sine(number(0.5 * fy) * y);
-    let mut py = number(FRAC_PI_2) * sine(number(0.5 * fx) * x);
     let (mut t1, mut t2, mut c) = (number(0.0), number(0.0), 1.0);
     for _ in 0..4 {
+        let px = number(FRAC_PI_2) * sine(number(0.5 * fy) * y);
+        let py = number(FRAC_PI_2) * sine(number(0.5 * fx) * x);
         t1 = t1 + sine(number(fx).mul_add(x, px)).mul_add(number(c), number(1.0));
         t2 = t2 + sine(number(fy).mul_add(y, py)).mul_add(number(c), number(1.0));
-        px = number(FRAC_PI_2) * sine(number(fy) * y);
-        py = number(FRAC_PI_2) * sine(number(fx) * x);
         fx *= 2.0;
         fy *= 2.0;
         c *= 0.707;
