@@ -147,7 +147,7 @@ impl<S: Real> World<S> {
 
     /// Positions and geometric normals of hits `first..first + N` of `rays` on shapes and solids, as [`Self::surface`]
     /// gives them up to rounding in `S`, but for degenerate ones, whose normals are not unit.
-    #[inline]
+    #[inline(always)]
     pub fn met(&self, rays: &Rays<S>, hits: &Hits<S>, first: usize) -> Met<S::Wide> {
         self.look_up::<true>(rays, hits, first, u32::MAX)
     }

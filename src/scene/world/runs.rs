@@ -108,7 +108,7 @@ impl Runs {
     }
 
     /// The run of primitive `prim` and its number.
-    #[inline]
+    #[inline(always)]
     pub fn find(&self, prim: u32) -> (usize, Run) {
         let cell = (prim >> self.shift) as usize;
         let low = self.starts[cell] as usize;

@@ -151,7 +151,8 @@ pub(super) struct Found<S> {
 }
 
 impl<S: Real> Found<S> {
-    /// Of `rays`, whose hits are `hits`.
+    /// Of `rays`, whose hits are `hits`. A call of its own, with all of it inside: one call for each vector takes longer.
+    #[inline(never)]
     pub fn set(&mut self, world: &World<S>, rays: &Rays<S>, hits: &Hits<S>) {
         self.open(rays.padded_len());
         (0..self.hit.len()).for_each(|k| self.set_vector(k, world, rays, hits));
@@ -171,7 +172,7 @@ impl<S: Real> Found<S> {
     }
 
     /// Sets what vector `k` of lanes has met.
-    #[inline]
+    #[inline(always)]
     pub fn set_vector(&mut self, k: usize, world: &World<S>, rays: &Rays<S>, hits: &Hits<S>) {
         let first = k * S::Wide::N;
         let met = world.met(rays, hits, first);

@@ -62,6 +62,7 @@ impl<S: Real> Shader<'_, S> {
 }
 
 /// What surfaces show without lights: ambient light, their own light, or a pattern as it is.
+#[inline(never)]
 fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
     let Meetings { kinds, base, color, .. } = meetings;
     for (k, kinds) in kinds.iter().enumerate().filter(|(_, kinds)| kinds.entering != 0) {
@@ -85,6 +86,7 @@ fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Me
 }
 
 /// Finds the directions to `lamp`, and the lanes that it may light.
+#[inline(never)]
 fn face<S: Real>(lamp: &Lamp, found: &Found<S>, meetings: &mut Meetings<S>) {
     let splat = |v: DVec3| each(|axis| S::Wide::constant(v[axis]));
     let Meetings { kinds, to_light, facing, .. } = meetings;
@@ -103,6 +105,7 @@ fn face<S: Real>(lamp: &Lamp, found: &Found<S>, meetings: &mut Meetings<S>) {
 }
 
 /// Shadow rays from the meetings to the light that they face.
+#[inline(never)]
 fn aim<S: Real>(found: &Found<S>, meetings: &Meetings<S>, probes: &mut Probes<S>) {
     probes.open(meetings.padded());
     for (k, &facing) in meetings.facing.iter().enumerate().filter(|(_, facing)| **facing != 0) {
@@ -117,6 +120,7 @@ fn aim<S: Real>(found: &Found<S>, meetings: &Meetings<S>, probes: &mut Probes<S>
 /// Adds the light of `lamp`: diffuse, and the highlight.
 ///
 /// Source of the highlight: Christophe Schlick, "A Fast Alternative to Phong's Specular Model", Graphics Gems IV, 1994.
+#[inline(never)]
 fn light<S: Real>(lamp: &Lamp, level: &Level<S>, found: &Found<S>, meetings: &mut Meetings<S>) {
     let zero = S::Wide::constant(0.0);
     let Meetings { base, finish, color, to_light, facing, visible, .. } = meetings;
