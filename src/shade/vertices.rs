@@ -41,12 +41,19 @@ pub(super) struct Vertices<S> {
     pub lanes: Vec<u32>,
     /// Those that met something that shines by itself.
     pub shining: Vec<u32>,
+    /// Those that met something that may mirror or let pass: only theirs are the fields of mirrors and of what lies behind.
+    sending: Vec<u32>,
     fields: [Vec<S>; FIELDS],
 }
 
 impl<S: Real> Default for Vertices<S> {
     fn default() -> Self {
-        Self { lanes: Vec::new(), shining: Vec::new(), fields: std::array::from_fn(|_| Vec::new()) }
+        Self {
+            lanes: Vec::new(),
+            shining: Vec::new(),
+            sending: Vec::new(),
+            fields: std::array::from_fn(|_| Vec::new()),
+        }
     }
 }
 
@@ -55,12 +62,18 @@ impl<S: Real> Vertices<S> {
     fn open(&mut self, padded: usize) {
         self.lanes.clear();
         self.shining.clear();
+        self.sending.clear();
         self.fields.iter_mut().for_each(|field| field.resize(padded, S::ZERO));
     }
 
     /// Vectors of lanes in which something was met: the first ray and the lanes.
     pub fn packets(&self) -> impl Iterator<Item = (usize, u32)> {
         chosen::packets::<S::Wide>(&self.lanes)
+    }
+
+    /// The same of those that may mirror or let pass.
+    pub fn sending(&self) -> impl Iterator<Item = (usize, u32)> {
+        chosen::packets::<S::Wide>(&self.sending)
     }
 
     /// Field `field` of rays `first..first + N`.
@@ -124,6 +137,7 @@ impl<S: Real> Shader<'_, S> {
             let hit = met_lanes(hits, first);
             vertices.lanes.push(hit);
             vertices.shining.push(0);
+            vertices.sending.push(0);
             if hit == 0 {
                 continue;
             }
@@ -191,6 +205,7 @@ impl<S: Real> Shader<'_, S> {
             vertices.put(field, i, value);
         }
         vertices.fields[ETA][i] = S::from_f64(classic.eta);
+        vertices.sending[i / S::Wide::N] |= 1 << (i % S::Wide::N);
         vertices.fields[AMBIENT][i] = S::from_f64(self.looks.ambient(surface.material, surface));
         if classic.emission != DVec3::ZERO {
             vertices.put(EMISSION, i, classic.emission);
@@ -245,9 +260,15 @@ impl<S: Real> Shader<'_, S> {
     ) {
         let Terms { diffuse, mirror, through, eta } = Terms::of(model, base, param, cos);
         vertices.put_some(lanes, DIFFUSE, first, diffuse);
-        vertices.put_some(lanes, MIRROR, first, mirror);
-        vertices.put_some(lanes, THROUGH, first, through);
-        vertices.put_some(lanes, ETA, first, [eta]);
+        let zero = S::Wide::constant(0.0);
+        let mirrors = !(mirror[0].cmp_eq(zero) & mirror[1].cmp_eq(zero) & mirror[2].cmp_eq(zero));
+        let sending = lanes & if matches!(model, Model::Matte) { mirrors.bits() } else { S::Wide::ALL };
+        if sending != 0 {
+            vertices.sending[first / S::Wide::N] |= sending;
+            vertices.put_some(lanes, MIRROR, first, mirror);
+            vertices.put_some(lanes, THROUGH, first, through);
+            vertices.put_some(lanes, ETA, first, [eta]);
+        }
         // What is the same everywhere has no texture of what the ambient light reaches.
         vertices.put_some(lanes, AMBIENT, first, [S::Wide::constant(1.0)]);
     }

@@ -156,7 +156,7 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
     };
     let along = |first: usize| -> Lanes3<S::Wide> { each(|axis| S::Wide::load(&rays.dir[axis][first..])) };
     next.open(2 * rays.len());
-    for (first, lanes) in vertices.packets() {
+    for (first, lanes) in vertices.sending() {
         let throughput = times(carried.weight(first), vertices.vector(MIRROR, first));
         let lanes = lanes & bright(throughput);
         if lanes == 0 {
@@ -170,7 +170,7 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
         next.push(lanes, &carried.path[first..], [vertices.leave(first), dir, throughput], S::INFINITY);
     }
     let count_mirrored = next.len();
-    for (first, lanes) in vertices.packets() {
+    for (first, lanes) in vertices.sending() {
         let throughput = times(carried.weight(first), vertices.vector(THROUGH, first));
         let lanes = lanes & bright(throughput);
         if lanes == 0 {
