@@ -1,7 +1,8 @@
 //! Batches of rays and hits as structures of arrays.
 //!
 //! A batch is what an engine gets in one call: usually the rays of one 32x32 or 16x16 pixel tile in Morton order.
-//! The arrays are padded with dead rays to a multiple of [`PAD`], so every packet width loads whole vectors.
+//! The arrays are padded with dead rays to a multiple of [`PAD`], so every packet width loads whole vectors. They may be
+//! longer: what is behind the padding means nothing.
 
 use crate::lanes::chosen::Chosen;
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each};
@@ -17,7 +18,7 @@ pub const PAD: usize = 16;
 #[derive(Clone, Debug, Default)]
 pub struct Rays<S> {
     len: usize,
-    /// Origins: x, y, z arrays of `padded_len` values.
+    /// Origins: x, y, z arrays of `padded_len` values at least.
     pub org: [Vec<S>; 3],
     /// Directions.
     pub dir: [Vec<S>; 3],
@@ -38,47 +39,36 @@ impl<S: Real> Rays<S> {
 
     /// Makes this a batch of `len` dead rays, keeping the memory.
     pub fn reset(&mut self, len: usize) {
-        let padded = len.next_multiple_of(PAD);
-        self.len = len;
+        self.open(len);
+        let padded = self.padded_len();
         for array in self.org.iter_mut().chain(&mut self.dir).chain([&mut self.t_max]) {
-            array.clear();
-            array.resize(padded, S::from_f64(0.0));
+            array[..padded].fill(S::ZERO);
         }
-        self.t_min.clear();
-        self.t_min.resize(padded, S::from_f64(1.0));
+        self.t_min[..padded].fill(S::ONE);
     }
 
     /// Makes this a batch of `len` rays with unspecified contents, for who sets all of them; padding is dead.
     pub fn prepare(&mut self, len: usize) {
-        if len.is_multiple_of(PAD) && self.padded_len() == len {
-            self.len = len;
-        } else {
-            self.reset(len);
-        }
+        self.open(len);
+        self.close(len);
     }
 
     /// Makes room for `len` rays with unspecified contents, for who sets some; [`Self::close`] ends that.
     pub fn open(&mut self, len: usize) {
-        let padded = len.next_multiple_of(PAD);
         self.len = len;
+        let padded = self.padded_len();
+        // Longer ones stay as they are: filling them anew takes time.
         for array in self.org.iter_mut().chain(&mut self.dir).chain([&mut self.t_min, &mut self.t_max]) {
-            array.resize(padded, S::ZERO);
+            if array.len() < padded {
+                array.resize(padded, S::ZERO);
+            }
         }
     }
 
     /// Keeps the first `len` rays, which have been set.
     pub fn close(&mut self, len: usize) {
-        self.truncate(len);
-        (self.len..self.padded_len()).for_each(|i| self.kill(i));
-    }
-
-    /// Keeps the first `len` rays; those after them must be dead.
-    pub fn truncate(&mut self, len: usize) {
-        let padded = len.next_multiple_of(PAD);
         self.len = len.min(self.len);
-        for array in self.org.iter_mut().chain(&mut self.dir).chain([&mut self.t_min, &mut self.t_max]) {
-            array.truncate(padded);
-        }
+        (self.len..self.padded_len()).for_each(|i| self.kill(i));
     }
 
     /// Number of rays, without padding.
@@ -93,7 +83,7 @@ impl<S: Real> Rays<S> {
 
     /// Length of the arrays.
     pub fn padded_len(&self) -> usize {
-        self.t_min.len()
+        self.len.next_multiple_of(PAD)
     }
 
     /// Sets ray `i`.
@@ -216,11 +206,10 @@ impl<S: Real> Hits<S> {
 
     /// Makes this `len` hits and misses, with unspecified contents: for who writes all of them.
     pub fn prepare(&mut self, len: usize) {
-        if self.t.len() == len.next_multiple_of(PAD) {
-            self.len = len;
-        } else {
-            self.reset(len);
-        }
+        let padded = len.next_multiple_of(PAD);
+        self.len = len;
+        [&mut self.t, &mut self.u, &mut self.v].into_iter().for_each(|array| array.resize(padded, S::INFINITY));
+        [&mut self.prim, &mut self.inst].into_iter().for_each(|array| array.resize(padded, INVALID_ID));
     }
 
     /// Number of hits and misses, without padding.

@@ -14,6 +14,8 @@ pub(super) struct Branches<S> {
     /// The sample that each belongs to.
     pub path: Vec<u32>,
     weight: [Vec<S>; 3],
+    /// Whether all of the radiance along all of them arrives: there are no weights.
+    is_whole: bool,
 }
 
 impl<S: Real> Branches<S> {
@@ -21,17 +23,17 @@ impl<S: Real> Branches<S> {
     pub fn start(&mut self, len: usize) {
         self.open(0);
         self.path.extend(0..len as u32);
-        for weight in &mut self.weight {
-            weight.clear();
-            weight.resize(len.next_multiple_of(MAX_LANES), S::ONE);
-        }
+        self.is_whole = true;
     }
 
     /// None, with room for `most`.
     pub fn open(&mut self, most: usize) {
         self.rays.open(most);
         self.path.clear();
-        self.weight.iter_mut().for_each(|weight| weight.resize(most.next_multiple_of(MAX_LANES), S::ZERO));
+        self.is_whole = false;
+        let padded = most.next_multiple_of(MAX_LANES);
+        // Longer ones stay as they are: filling them anew takes time.
+        self.weight.iter_mut().filter(|weight| weight.len() < padded).for_each(|weight| weight.resize(padded, S::ZERO));
     }
 
     /// Adds those of the lanes `lanes`, which belong to the samples `path`: rays from `org` along `dir` up to `t_max`.
@@ -55,13 +57,13 @@ impl<S: Real> Branches<S> {
         self.path.len()
     }
 
-    /// What rays `first..first + N` carry.
+    /// What arrives of the radiance `color` along rays `first..first + N`.
     #[inline(always)]
-    pub fn weight(&self, first: usize) -> Lanes3<S::Wide> {
-        each(|axis| S::Wide::load(&self.weight[axis][first..]))
+    pub fn weighed(&self, first: usize, color: Lanes3<S::Wide>) -> Lanes3<S::Wide> {
+        if self.is_whole { color } else { each(|axis| S::Wide::load(&self.weight[axis][first..]) * color[axis]) }
     }
 
-    /// What ray `i` carries.
+    /// What ray `i` carries, which has a weight of its own.
     #[inline]
     pub fn weight_of(&self, i: usize) -> DVec3 {
         DVec3::from(each(|axis| self.weight[axis][i].to_f64()))

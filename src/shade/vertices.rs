@@ -19,7 +19,7 @@ pub(super) const POSITION: usize = 0;
 /// Unit geometric normal, on the side that the ray came from.
 pub(super) const NORMAL: usize = 3;
 /// Unit shading normal, on that side.
-pub(super) const SHADING: usize = 6;
+const SHADING: usize = 6;
 /// How far along the normal a ray must start.
 pub(super) const OFFSET: usize = 9;
 /// The terms of [`Classic`].
@@ -28,7 +28,7 @@ pub(super) const MIRROR: usize = 13;
 pub(super) const THROUGH: usize = 16;
 pub(super) const ETA: usize = 19;
 /// Share of ambient light that arrives.
-pub(super) const AMBIENT: usize = 20;
+const AMBIENT: usize = 20;
 /// Only of those that shine.
 pub(super) const EMISSION: usize = 21;
 /// Number of fields.
@@ -43,6 +43,9 @@ pub(super) struct Vertices<S> {
     pub shining: Vec<u32>,
     /// Those that met something that may mirror or let pass: only theirs are the fields of mirrors and of what lies behind.
     sending: Vec<u32>,
+    /// Those that were worked out one by one: only vectors with such have shading normals of their own, and shares of ambient
+    /// light.
+    single: Vec<u32>,
     fields: [Vec<S>; FIELDS],
 }
 
@@ -52,6 +55,7 @@ impl<S: Real> Default for Vertices<S> {
             lanes: Vec::new(),
             shining: Vec::new(),
             sending: Vec::new(),
+            single: Vec::new(),
             fields: std::array::from_fn(|_| Vec::new()),
         }
     }
@@ -63,6 +67,7 @@ impl<S: Real> Vertices<S> {
         self.lanes.clear();
         self.shining.clear();
         self.sending.clear();
+        self.single.clear();
         self.fields.iter_mut().for_each(|field| field.resize(padded, S::ZERO));
     }
 
@@ -86,6 +91,22 @@ impl<S: Real> Vertices<S> {
     #[inline(always)]
     pub fn vector<V: Lanes<Scalar = S>>(&self, field: usize, first: usize) -> Lanes3<V> {
         [self.scalar(field, first), self.scalar(field + 1, first), self.scalar(field + 2, first)]
+    }
+
+    /// Shading normals of the same.
+    #[inline(always)]
+    pub fn shading(&self, first: usize) -> Lanes3<S::Wide> {
+        self.vector(if self.has_single(first) { SHADING } else { NORMAL }, first)
+    }
+
+    /// The share of ambient light that arrives at the same.
+    #[inline(always)]
+    pub fn ambient(&self, first: usize) -> S::Wide {
+        if self.has_single(first) { self.scalar(AMBIENT, first) } else { S::Wide::constant(1.0) }
+    }
+
+    fn has_single(&self, first: usize) -> bool {
+        self.single[first / S::Wide::N] != 0
     }
 
     /// Origins of rays that leave the points of rays `first..first + N` to the side of the normal.
@@ -114,9 +135,12 @@ impl<S: Real> Vertices<S> {
         values.iter().enumerate().for_each(|(k, value)| value.store(&mut self.fields[field + k][first..]));
     }
 
-    /// The same in the lanes `lanes` only.
+    /// The same in the lanes `lanes`, and, where others that met something lie beside them, in these only.
     #[inline(always)]
     fn put_some<const N: usize>(&mut self, lanes: u32, field: usize, first: usize, values: [S::Wide; N]) {
+        if lanes == self.lanes[first / S::Wide::N] {
+            return self.put_lanes(field, first, values);
+        }
         let mask = <S::Wide as Lanes>::Mask::from_bits(lanes);
         for (k, value) in values.into_iter().enumerate() {
             let column = &mut self.fields[field + k][first..];
@@ -139,22 +163,28 @@ impl<S: Real> Shader<'_, S> {
             vertices.shining.push(0);
             vertices.sending.push(0);
             if hit == 0 {
+                vertices.single.push(0);
                 continue;
             }
             let Met { place, mut material, known } =
                 self.meeting.places(self.world, &self.looks, rays, hits, first, hit);
             vertices.put_lanes(POSITION, first, place.position);
             vertices.put_lanes(NORMAL, first, place.normal);
-            vertices.put_lanes(SHADING, first, place.normal);
             vertices.put_lanes(OFFSET, first, [place.offset]);
             let mut front = place.front;
             let mut even = 0;
             for (id, same) in groups(&material, known) {
                 even |= if self.looks.is_even(id) { same } else { 0 };
             }
+            let single = hit & !even;
+            vertices.single.push(single);
+            if single != 0 {
+                vertices.put_lanes(SHADING, first, place.normal);
+                vertices.put_lanes(AMBIENT, first, [S::Wide::constant(1.0)]);
+            }
             // Others are worked out one by one: their materials too, where those are not the same everywhere.
             let mut settled = 0;
-            for lane in lanes_of(hit & !even) {
+            for lane in lanes_of(single) {
                 let surface = self.one(rays, hits, first + lane, vertices);
                 let dir = DVec3::from(rays.dir(first + lane).map(S::to_f64));
                 let is_front = surface.ng.dot(dir) <= 0.0;
@@ -269,7 +299,5 @@ impl<S: Real> Shader<'_, S> {
             vertices.put_some(lanes, THROUGH, first, through);
             vertices.put_some(lanes, ETA, first, [eta]);
         }
-        // What is the same everywhere has no texture of what the ambient light reaches.
-        vertices.put_some(lanes, AMBIENT, first, [S::Wide::constant(1.0)]);
     }
 }

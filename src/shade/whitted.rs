@@ -11,7 +11,7 @@ use super::meeting::met_lanes;
 use super::sample::Rgba;
 use super::shader::{Shader, Workspace};
 use super::spot::Spot;
-use super::vertices::{AMBIENT, DIFFUSE, EMISSION, ETA, MIRROR, NORMAL, POSITION, SHADING, THROUGH, Vertices};
+use super::vertices::{DIFFUSE, EMISSION, ETA, MIRROR, NORMAL, POSITION, THROUGH, Vertices};
 use crate::lanes::chosen::{at, lanes_of, spill};
 use crate::lanes::space::{add, choose, scale, times};
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each};
@@ -93,11 +93,11 @@ impl<S: Real> Shader<'_, S> {
             if lanes == 0 {
                 continue;
             }
-            let reflected = times(vertices.vector(DIFFUSE, first), scale(ambient, vertices.scalar(AMBIENT, first)));
+            let reflected = times(vertices.vector(DIFFUSE, first), scale(ambient, vertices.ambient(first)));
             let shines = <S::Wide as Lanes>::Mask::from_bits(shining);
             let nothing = [S::Wide::constant(0.0); 3];
             let emitted = choose(shines, vertices.vector(EMISSION, first), nothing);
-            let value = times(carried.weight(first), add(emitted, reflected));
+            let value = carried.weighed(first, add(emitted, reflected));
             let columns = spill(value);
             for lane in lanes_of(lanes) {
                 out[carried.path[first + lane] as usize].radiance += radiance(at(&columns, lane));
@@ -119,9 +119,9 @@ impl<S: Real> Shader<'_, S> {
         let zero = S::Wide::constant(0.0);
         shadows.open(if self.shadows { rays.len() } else { 0 });
         for (first, lanes) in vertices.packets() {
-            let (arriving, faces) = lamp.irradiance(vertices.vector(POSITION, first), vertices.vector(SHADING, first));
+            let (arriving, faces) = lamp.irradiance(vertices.vector(POSITION, first), vertices.shading(first));
             let diffuse = scale(vertices.vector(DIFFUSE, first), S::Wide::constant(FRAC_1_PI));
-            let value = times(times(carried.weight(first), diffuse), arriving);
+            let value = times(carried.weighed(first, diffuse), arriving);
             let some = !(value[0].cmp_eq(zero) & value[1].cmp_eq(zero) & value[2].cmp_eq(zero));
             let lit = (faces & some).bits() & lanes;
             if lit == 0 {
@@ -157,13 +157,13 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
     let along = |first: usize| -> Lanes3<S::Wide> { each(|axis| S::Wide::load(&rays.dir[axis][first..])) };
     next.open(2 * rays.len());
     for (first, lanes) in vertices.sending() {
-        let throughput = times(carried.weight(first), vertices.vector(MIRROR, first));
+        let throughput = carried.weighed(first, vertices.vector(MIRROR, first));
         let lanes = lanes & bright(throughput);
         if lanes == 0 {
             continue;
         }
         let (normal, dir) = (vertices.vector(NORMAL, first), along(first));
-        let mirrored = reflect(dir, vertices.vector(SHADING, first));
+        let mirrored = reflect(dir, vertices.shading(first));
         // Where the shading normal would send it into the surface, the surface's own normal decides.
         let outward = S::Wide::constant(0.0).cmp_lt(dot(mirrored, normal));
         let dir = choose(outward, mirrored, reflect(dir, normal));
@@ -171,7 +171,7 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
     }
     let count_mirrored = next.len();
     for (first, lanes) in vertices.sending() {
-        let throughput = times(carried.weight(first), vertices.vector(THROUGH, first));
+        let throughput = carried.weighed(first, vertices.vector(THROUGH, first));
         let lanes = lanes & bright(throughput);
         if lanes == 0 {
             continue;

@@ -54,7 +54,8 @@ mod tests {
                 assert!(span.hit && (span.t_in, span.t_out) == (2.0, 4.0), "{d:?} {y} {z}");
             }
             for (y, z) in [(1.001, 0.0), (0.0, -1.001), (-5.0, 5.0), (1.0, -1.5)] {
-                assert!(!planes_span([-3.0 * d[0], y, z], d, &CUBE).hit, "{d:?} {y} {z}");
+                let span: Span<f64> = planes_span([-3.0 * d[0], y, z], d, &CUBE);
+                assert!(!span.hit, "{d:?} {y} {z}");
             }
         }
     }
