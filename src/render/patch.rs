@@ -83,10 +83,10 @@ pub(super) struct Patch {
     runs: Vec<Range<usize>>,
     /// Numbers of the pixels that have one.
     kept: Vec<u32>,
-    /// Numbers of the pixels of a square's first row.
-    columns: Vec<u32>,
     /// Those pixels, if there are planes besides colours.
     pixels: Vec<Pixel>,
+    /// Numbers of the pixels of a square's first row.
+    columns: Vec<u32>,
     /// By channel: the value of each place.
     values: Vec<PlaneData>,
 }
