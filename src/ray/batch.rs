@@ -13,6 +13,14 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// Batches are padded to a multiple of this many rays (the widest packet).
 pub const PAD: usize = 16;
 
+/// Makes `column` have `len` values or more. What is left of earlier batches is not taken back, as filling it anew when it is
+/// wanted again takes time.
+pub fn at_least<T: Clone + Default>(column: &mut Vec<T>, len: usize) {
+    if column.len() < len {
+        column.resize(len, T::default());
+    }
+}
+
 /// A batch of rays, world space. `org` and `dir` hold the x, y and z arrays; directions need not be unit.
 /// A ray with `t_max < t_min`, a NaN or infinity in origin or direction, or a zero direction is dead: it misses.
 #[derive(Clone, Debug, Default)]
@@ -57,12 +65,8 @@ impl<S: Real> Rays<S> {
     pub fn open(&mut self, len: usize) {
         self.len = len;
         let padded = self.padded_len();
-        // Longer ones stay as they are: filling them anew takes time.
-        for array in self.org.iter_mut().chain(&mut self.dir).chain([&mut self.t_min, &mut self.t_max]) {
-            if array.len() < padded {
-                array.resize(padded, S::ZERO);
-            }
-        }
+        let arrays = self.org.iter_mut().chain(&mut self.dir).chain([&mut self.t_min, &mut self.t_max]);
+        arrays.for_each(|array| at_least(array, padded));
     }
 
     /// Keeps the first `len` rays, which have been set.

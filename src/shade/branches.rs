@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::lanes::chosen::Chosen;
 use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real, each};
-use crate::ray::Rays;
+use crate::ray::{Rays, at_least};
 
 /// Rays and, parallel to them, whose they are and what of the radiance along them arrives at the eye.
 #[derive(Clone, Debug, Default)]
@@ -32,8 +32,7 @@ impl<S: Real> Branches<S> {
         self.path.clear();
         self.is_whole = false;
         let padded = most.next_multiple_of(MAX_LANES);
-        // Longer ones stay as they are: filling them anew takes time.
-        self.weight.iter_mut().filter(|weight| weight.len() < padded).for_each(|weight| weight.resize(padded, S::ZERO));
+        self.weight.iter_mut().for_each(|weight| at_least(weight, padded));
     }
 
     /// Adds those of the lanes `lanes`, which belong to the samples `path`: rays from `org` along `dir` up to `t_max`.

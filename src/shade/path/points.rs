@@ -3,9 +3,9 @@
 
 use glam::DVec3;
 
-use super::wave::at_least;
 use crate::lanes::chosen::Picked;
 use crate::lanes::{Lanes, Lanes3, Real};
+use crate::ray::at_least;
 use crate::shade::place::Place;
 
 /// Points of one model.

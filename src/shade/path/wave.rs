@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::lanes::chosen::Chosen;
 use crate::lanes::{Lanes, Lanes3, Real, each};
-use crate::ray::{PAD, Rays};
+use crate::ray::{PAD, Rays, at_least};
 
 /// Rays and what their paths carry, in parallel.
 #[derive(Clone, Debug)]
@@ -19,14 +19,6 @@ pub struct Wave<S> {
     pub pdf: Vec<S>,
     /// Product of the squared relative indices of refraction that the throughput was divided by.
     pub squeeze: Vec<S>,
-}
-
-/// Makes `column` have `len` values or more: what is left of earlier waves is not taken back, as that is cleared when it is
-/// wanted again.
-pub fn at_least<S: Real>(column: &mut Vec<S>, len: usize) {
-    if column.len() < len {
-        column.resize(len, S::ZERO);
-    }
 }
 
 impl<S: Real> Default for Wave<S> {

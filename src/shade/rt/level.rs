@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{Carry, Path, TOLERANCE};
 use crate::lanes::chosen::{at, lanes_of, spill};
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3, space};
-use crate::ray::{Hits, Rays};
+use crate::ray::{Hits, Rays, at_least};
 use crate::scene::world::World;
 use crate::shade::sample::{Rgba, Samples};
 
@@ -160,13 +160,9 @@ impl<S: Real> Found<S> {
 
     /// Nothing yet, of `padded` rays; [`Self::set_vector`] sets some.
     pub fn open(&mut self, padded: usize) {
-        // Longer ones stay as they are: filling them anew takes time.
-        if self.t.len() < padded {
-            for array in self.position.iter_mut().chain(&mut self.normal).chain([&mut self.t]) {
-                array.resize(padded, S::ZERO);
-            }
-            self.region.resize(padded, 0);
-        }
+        let arrays = self.position.iter_mut().chain(&mut self.normal).chain([&mut self.t]);
+        arrays.for_each(|array| at_least(array, padded));
+        at_least(&mut self.region, padded);
         self.hit.resize(padded / S::Wide::N, 0);
         self.leaving.resize(padded / S::Wide::N, 0);
     }

@@ -7,6 +7,7 @@ use super::parameters::{uv, uv_of_arb};
 use super::pattern::Pattern;
 use crate::lanes::chosen::positions_in;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, space};
+use crate::ray::at_least;
 use crate::scene::world::World;
 
 /// What the paths of a level show where they enter regions, parallel to its rays.
@@ -49,10 +50,7 @@ impl<S: Real> Meetings<S> {
         self.kinds.clear();
         self.facing.resize(padded / S::Wide::N, 0);
         let lists = [&mut self.base, &mut self.finish, &mut self.color, &mut self.to_light];
-        // Longer ones stay as they are: filling them anew takes time.
-        for array in lists.into_iter().flatten().chain([&mut self.visible]).filter(|array| array.len() < padded) {
-            array.resize(padded, S::ZERO);
-        }
+        lists.into_iter().flatten().chain([&mut self.visible]).for_each(|array| at_least(array, padded));
     }
 
     /// The next vector of lanes, whose rays are those from `first` on: rays `entering` enter the regions of `found`, at the

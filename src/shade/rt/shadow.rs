@@ -5,7 +5,7 @@ use super::{Rt, TOLERANCE};
 use crate::lanes::chosen::{Chosen, lanes_of};
 use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real};
-use crate::ray::Rays;
+use crate::ray::{Rays, at_least};
 use crate::shade::shader::{Shader, Workspace};
 
 /// Partitions that begin at a ray's start and end before this, mm, are passed over.
@@ -51,9 +51,7 @@ impl<S: Real> Probes<S> {
         self.count = 0;
         self.passed.clear();
         // Lanes are written a vector at a time.
-        if self.slots.len() < room + MAX_LANES {
-            self.slots.resize(room + MAX_LANES, 0);
-        }
+        at_least(&mut self.slots, room + MAX_LANES);
     }
 
     /// Adds those of `lanes` from hits `first + lane`, towards the light at the unit directions `dir`; `org` is the tolerance
