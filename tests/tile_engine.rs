@@ -177,6 +177,58 @@ fn segments_and_dead_rays() {
     }
 }
 
+/// What a block is does not matter to the others of its batch, whichever kernel it is for and however long its rays wait there.
+#[test]
+fn blocks_of_all_sorts_in_one_batch() {
+    const BLOCK: usize = 1024;
+    // Flat, for mirrors.
+    let corners = [[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]].map(|[x, y]| DVec3::new(x, -1.0, y));
+    let floor = Mesh { positions: corners.into(), triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
+    let (scene, mut r) = (compile(vec![ball(20, 30), soup(300, &mut Random(3)), floor]), Random(9));
+    let picture = camera(DVec3::new(4.0, 3.0, 5.0), DVec3::ZERO, 0.3, 32);
+    let thrown = mirrored(&scene, &picture);
+    let blocks = 24;
+    let mut rays = Rays::new(blocks * BLOCK - 5);
+    for block in 0..blocks {
+        let (sort, dead) = (block % 4, [0, 16, 700, BLOCK][r.below(4)]);
+        let scattered = common::rays(BLOCK, block as u64);
+        for k in 0..BLOCK.min(rays.len() - block * BLOCK) {
+            let i = block * BLOCK + k;
+            let from = match sort {
+                0 => &picture,
+                1 => &thrown,
+                _ => &scattered,
+            };
+            rays.set(i, from.org(k), from.dir(k), from.t_min[k], from.t_max[k]);
+            if k < dead {
+                rays.kill(i);
+            }
+        }
+    }
+    assert_eq!(differences(&scene, &rays), (0, 0));
+    let (mut all, mut alone, mut scratch) = (Hits::default(), Hits::default(), Scratch::default());
+    let (mut all_any, mut alone_any) = (Vec::new(), Vec::new());
+    for name in ["tile", "tile-exact", "tile-16x16"] {
+        find(name).intersect(&scene, &rays, &mut all, &mut scratch, None);
+        find(name).occluded(&scene, &rays, &mut all_any, &mut scratch, None);
+        for first in (0..rays.len()).step_by(BLOCK) {
+            let mut block = Rays::new(BLOCK.min(rays.len() - first));
+            for k in 0..block.len() {
+                let i = first + k;
+                block.set(k, rays.org(i), rays.dir(i), rays.t_min[i], rays.t_max[i]);
+            }
+            find(name).intersect(&scene, &block, &mut alone, &mut scratch, None);
+            find(name).occluded(&scene, &block, &mut alone_any, &mut scratch, None);
+            for k in 0..block.len() {
+                let bits = |h: &Hits<f32>, i: usize| (h.t[i].to_bits(), h.prim[i], h.u[i].to_bits(), h.v[i].to_bits());
+                assert_eq!(bits(&all, first + k), bits(&alone, k), "{name}: ray {k} of block {}", first / BLOCK);
+                assert_eq!(all_any[first + k], alone_any[k], "{name}: ray {k} of block {}", first / BLOCK);
+            }
+        }
+    }
+    assert!(all.hit_count() > 3000, "{}", all.hit_count());
+}
+
 #[test]
 fn ends_exactly_at_a_hit() {
     let (world, mut r) = (compile(vec![soup(800, &mut Random(4))]), Random(8));

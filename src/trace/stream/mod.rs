@@ -50,8 +50,6 @@ const KEYS: usize = 4 * OCTANTS;
 pub struct Memory<S> {
     /// Numbers of the rays of each octant along each dominant axis: octants along x, then along y, then along z.
     bins: [Vec<u32>; KEYS],
-    /// How many they are.
-    sorted: usize,
     /// Those of one octant, along x, then y, then z.
     ids: Vec<u32>,
     chunk: Chunk<S>,
@@ -67,7 +65,6 @@ impl<S: Real> Default for Memory<S> {
     fn default() -> Self {
         Self {
             bins: Default::default(),
-            sorted: 0,
             ids: Vec::new(),
             chunk: Chunk::default(),
             local: Chunk::default(),
@@ -130,29 +127,20 @@ impl<S: Real> Job<'_, S> {
         &mut self,
         starts: impl Iterator<Item = usize>,
     ) {
-        self.take::<V, ANY, COUNT>(starts);
-        self.finish::<V, ANY, COUNT>();
-    }
-
-    /// The same, but some of their rays may wait for others to be sorted with, at most until [`Self::finish`].
-    pub fn take<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
-        &mut self,
-        starts: impl Iterator<Item = usize>,
-    ) {
         self.memory.waiting.reserve(self.world.stack_bound());
         if self.world.is_of_shapes() {
             self.blocks::<V, ANY, COUNT>(starts);
-            return;
-        }
-        let mut sorted = self.memory.sorted;
-        for at in starts {
-            sorted += self.among_triangles::<V, ANY, COUNT>(at);
-            if sorted + V::N > SOURCE {
-                self.finish::<V, ANY, COUNT>();
-                sorted = 0;
+        } else {
+            let mut sorted = 0;
+            for at in starts {
+                sorted += self.among_triangles::<V, ANY, COUNT>(at);
+                if sorted + V::N > SOURCE {
+                    self.sorted::<V, ANY, COUNT>();
+                    sorted = 0;
+                }
             }
         }
-        self.memory.sorted = sorted;
+        self.sorted::<V, ANY, COUNT>();
     }
 
     /// Traces vectors of rays among shapes, some as blocks, and sorts the others.
@@ -161,19 +149,18 @@ impl<S: Real> Job<'_, S> {
         mut starts: impl Iterator<Item = usize>,
     ) {
         self.memory.block.start();
-        let mut sorted = self.memory.sorted;
+        let mut sorted = 0;
         loop {
             let (mut some, mut count) = ([0; block::SIZES[0]], 0);
             for (to, at) in some.iter_mut().zip(&mut starts) {
                 (*to, count) = (at, count + 1);
             }
             if count == 0 {
-                self.memory.sorted = sorted;
                 return;
             }
             sorted += self.block::<V, ANY, COUNT>(&some[..count], 0);
             if sorted + V::N * block::SIZES[0] > SOURCE {
-                self.finish::<V, ANY, COUNT>();
+                self.sorted::<V, ANY, COUNT>();
                 sorted = 0;
             }
         }
@@ -269,10 +256,9 @@ impl<S: Real> Job<'_, S> {
     }
 
     /// Traces what was sorted, chunk by chunk.
-    #[inline(never)]
-    pub fn finish<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
-        let Memory { bins, sorted, ids, chunk, local, best, waiting, closer, .. } = &mut *self.memory;
-        *sorted = 0;
+    #[inline(always)]
+    fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
+        let Memory { bins, ids, chunk, local, best, waiting, closer, .. } = &mut *self.memory;
         for octant in 0..OCTANTS {
             ids.clear();
             bins[octant..].iter_mut().step_by(OCTANTS).for_each(|alike| ids.append(alike));

@@ -63,16 +63,6 @@ pub struct Bundle<'a> {
     pub odd: [u32; GROUPS],
 }
 
-/// What a look at rays tells.
-pub enum Look<'a> {
-    /// They have a point in common.
-    Shared(Bundle<'a>),
-    /// They have none.
-    Apart,
-    /// None of them is live.
-    Nothing,
-}
-
 /// Rays of pencils go at most this far to the side per unit of distance, by each axis: the frame of such a tile has the
 /// pencil's depth axis, and coordinates across it that follow the tile.
 const MOST_SHEAR: f64 = 2.0;
@@ -100,26 +90,24 @@ pub fn prefetch_rays(rays: &Rays<f32>, first: usize) {
 }
 
 impl<'a> Bundle<'a> {
-    /// Looks at `N` sets of rays. `any`: a common end will do.
+    /// Looks at `N` sets of rays; `None` if they have no point in common. `any`: a common end will do.
     #[inline(always)]
-    pub fn find<const N: usize>(rays: &'a Rays<f32>, first: usize, any: bool) -> Look<'a> {
-        let mut bundle = Self::unsorted(rays, first, 0);
-        let len = groups::<N>(rays, first);
-        // Most rays without a common point show it within the first group that has any.
-        while bundle.len < len && bundle.tame[bundle.len.saturating_sub(1)] == 0 {
-            bundle.len += 1;
-            bundle.sort_lanes(rays, bundle.len - 1);
+    pub fn find<const N: usize>(rays: &'a Rays<f32>, first: usize, any: bool) -> Option<Self> {
+        // Most rays without a common point show it within the first group.
+        if Self::is_scattered(rays, first, any) {
+            return None;
         }
-        let seen = bundle.len;
-        if bundle.tame == [0; GROUPS] && bundle.odd == [0; GROUPS] {
-            return Look::Nothing;
-        }
-        if !bundle.share(rays, any) {
-            return Look::Apart;
-        }
-        bundle.len = len;
-        bundle.sort_lanes(rays, seen);
-        if bundle.share(rays, any) { Look::Shared(bundle) } else { Look::Apart }
+        let mut bundle = Self::unsorted(rays, first, groups::<N>(rays, first));
+        bundle.sort_lanes(rays);
+        bundle.share(rays, any).then_some(bundle)
+    }
+
+    /// Whether the rays of the group that starts with ray `first` have no point in common.
+    #[inline(never)]
+    pub fn is_scattered(rays: &'a Rays<f32>, first: usize, any: bool) -> bool {
+        let mut group = Self::unsorted(rays, first, 1);
+        group.sort_group(rays, 0);
+        group.tame[0] != 0 && !group.share(rays, any)
     }
 
     /// `N` sets of rays that all start in one point, as far as the first group tells: who loads them looks at the others
@@ -285,8 +273,8 @@ impl<'a> Bundle<'a> {
     }
 
     #[inline(always)]
-    fn sort_lanes(&mut self, rays: &Rays<f32>, from: usize) {
-        for g in from..self.len {
+    fn sort_lanes(&mut self, rays: &Rays<f32>) {
+        for g in 0..self.len {
             prefetch_rays(rays, self.first + (g + AHEAD) * V::N);
             self.sort_group(rays, g);
         }

@@ -33,12 +33,6 @@ const MOSTLY: u32 = 12;
 /// Points in a row that may turn out to be none before the rest of a block is left to others.
 const FAILURES: u32 = 4;
 
-/// The first groups of a block that are tried, but for the very first.
-pub const FIRST_GROUPS: [usize; 2] = [STRIDE, 2 * STRIDE];
-
-/// From one group to the next that is tried. It and 64 have no common divisor: all groups, in an order that jumps about.
-const STRIDE: usize = 21;
-
 /// Groups whose rays a point is made from.
 const SAMPLE: usize = V::N;
 
@@ -88,7 +82,8 @@ impl<'a> Search<'a> {
     /// The group that is to be tried next.
     fn next(&mut self) -> Option<usize> {
         while self.failures < FAILURES && self.tried < GROUPS {
-            let g = self.tried * STRIDE % GROUPS;
+            // 21 and 64 have no common divisor: all groups, in an order that jumps about.
+            let g = self.tried * 21 % GROUPS;
             self.tried += 1;
             if g < self.all.len {
                 return Some(g);

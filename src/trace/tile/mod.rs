@@ -36,7 +36,7 @@ use super::{Generic, Scratch, stream, traverse};
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, HitPacket, Packet, Pencil, Rays};
 use crate::scene::world::{Object, World};
-use bundle::{Bundle, Look, Shared};
+use bundle::{Bundle, Shared};
 use exact::Exact;
 
 /// A group's rays: the vector of the whole engine.
@@ -171,59 +171,47 @@ impl<'a> Job<'a> {
                 self.leave::<SETS>(first);
                 continue;
             }
-            self.block_at::<ANY, EXACT, COUNT>(first, mirrors);
-            if self.memory.left.len() > stream::SOURCE {
-                self.streams::<ANY, COUNT>(true);
-                self.leftovers::<COUNT>();
+            if self.most == GROUPS && self.presumed::<ANY, EXACT, COUNT>(first) {
+                continue;
             }
-            // While what was looked at is still in the caches, and the next block on its way there.
-            if !self.memory.rest.is_empty() {
-                self.streams::<ANY, COUNT>(false);
+            // Rays whose first group has no point in common have none in a set of theirs either, most probably.
+            let scattered = self.most == GROUPS && Bundle::is_scattered(self.rays, first, ANY);
+            if self.most == GROUPS
+                && !scattered
+                && let Some(bundle) = Bundle::find::<SETS>(self.rays, first, ANY)
+            {
+                self.block::<ANY, EXACT, COUNT>(&bundle);
+                continue;
+            }
+            if mirrors && self.mirrored::<EXACT, COUNT>(first) {
+                if self.memory.left.len() > stream::SOURCE {
+                    self.leftovers::<COUNT>();
+                }
+                continue;
+            }
+            if scattered {
+                self.leave::<SETS>(first);
+                continue;
+            }
+            for first in (first..self.rays.len().min(first + BLOCK)).step_by(SET * V::N) {
+                match Bundle::find::<1>(self.rays, first, ANY) {
+                    Some(bundle) => self.block::<ANY, EXACT, COUNT>(&bundle),
+                    None => self.leave::<1>(first),
+                }
             }
         }
-        self.streams::<ANY, COUNT>(true);
         if self.memory.left.len() > 0 {
             self.leftovers::<COUNT>();
         }
-    }
-
-    /// Traces the block that starts with ray `first`, or leaves it or parts of it to the stream kernel.
-    #[inline(always)]
-    fn block_at<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, first: usize, mirrors: bool) {
-        if self.most == GROUPS && self.presumed::<ANY, EXACT, COUNT>(first) {
+        if self.memory.rest.is_empty() {
             return;
         }
-        // The next block is probably of the same sort, and this is where it will be looked at.
-        let looks = (0..BLOCK).step_by(SET * V::N).chain(mirror::FIRST_GROUPS.map(|g| g * V::N));
-        looks.for_each(|at| bundle::prefetch_rays(self.rays, first + BLOCK + at));
-        if self.most == GROUPS {
-            match Bundle::find::<SETS>(self.rays, first, ANY) {
-                Look::Shared(bundle) => return self.block::<ANY, EXACT, COUNT>(&bundle),
-                Look::Nothing => return self.leave::<SETS>(first),
-                Look::Apart => {}
-            }
-        }
-        if mirrors && self.mirrored::<EXACT, COUNT>(first) {
-            return;
-        }
-        for first in (first..self.rays.len().min(first + BLOCK)).step_by(SET * V::N) {
-            match Bundle::find::<1>(self.rays, first, ANY) {
-                Look::Shared(bundle) => self.block::<ANY, EXACT, COUNT>(&bundle),
-                Look::Apart | Look::Nothing => self.leave::<1>(first),
-            }
-        }
-    }
-
-    /// Hands the groups that are for the stream kernel over to it; `is_end`: there are no more.
-    fn streams<const ANY: bool, const COUNT: bool>(&mut self, is_end: bool) {
-        let mut starts = std::mem::take(&mut self.memory.rest);
+        let starts = std::mem::take(&mut self.memory.rest);
         let Self { world, rays, stream: memory, stack, counters, output, .. } = self;
         let mut job = stream::Job { world, rays, memory, stack, counters, output: output.reborrow() };
-        job.take::<V, ANY, COUNT>(starts.drain(..));
-        if is_end {
-            job.finish::<V, ANY, COUNT>();
-        }
+        job.run::<V, ANY, COUNT>(starts.iter().copied());
         self.memory.rest = starts;
+        self.memory.rest.clear();
     }
 
     /// Traces a block whose rays all start in one point, as most do, after one look at them; false if they do not, or spread
