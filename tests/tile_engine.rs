@@ -187,21 +187,37 @@ fn blocks_of_all_sorts_in_one_batch() {
     let (scene, mut r) = (compile(vec![ball(20, 30), soup(300, &mut Random(3)), floor]), Random(9));
     let picture = camera(DVec3::new(4.0, 3.0, 5.0), DVec3::ZERO, 0.3, 32);
     let thrown = mirrored(&scene, &picture);
-    let blocks = 24;
+    let lit = |light: [f64; 3], end, t_min| shadows(&scene, &picture, DVec3::from(light), end, t_min);
+    let to_light = [lit([3.0, 4.0, 1.0], 1.0, 0.0), lit([3.0, 4.0, 1.0], 3.0, 0.01)];
+    let to_other = lit([-2.0, 4.0, 3.0], 1.0, 0.0);
+    let blocks = 48;
     let mut rays = Rays::new(blocks * BLOCK - 5);
     for block in 0..blocks {
-        let (sort, dead) = (block % 4, [0, 16, 700, BLOCK][r.below(4)]);
+        let (sort, dead) = (block % 6, [0, 16, 700, BLOCK][r.below(4)]);
         let scattered = common::rays(BLOCK, block as u64);
+        // From some ray on the point that the first group has in common is not what the others have; dead and odd rays everywhere.
+        let (turn, holes, odd) = ([BLOCK, 500, 1000][r.below(3)], [0, 3, 20][r.below(3)], [0, 300][r.below(2)]);
         for k in 0..BLOCK.min(rays.len() - block * BLOCK) {
             let i = block * BLOCK + k;
             let from = match sort {
-                0 => &picture,
+                0 if k < turn => &picture,
                 1 => &thrown,
+                2 | 3 if k < turn => &to_light[sort - 2],
+                2 | 3 => &to_other,
                 _ => &scattered,
             };
             rays.set(i, from.org(k), from.dir(k), from.t_min[k], from.t_max[k]);
             if k < dead {
                 rays.kill(i);
+            } else if holes != 0 && r.below(holes) == 0 {
+                match r.below(4) {
+                    0 => rays.org[r.below(3)][i] = f32::NAN,
+                    1 => rays.dir[r.below(3)][i] = f32::INFINITY,
+                    2 => rays.t_max[i] = f32::NAN,
+                    _ => rays.kill(i),
+                }
+            } else if odd != 0 && r.below(odd) == 0 {
+                rays.dir[0][i] = 1e30;
             }
         }
     }

@@ -1,14 +1,14 @@
 //! Boundaries of leaves on a packet's lines, before they are put in order.
 
-use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
+use crate::lanes::{Column, LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::slab::Interval;
 use crate::shape::Span;
 
 /// Boundaries of leaves: `MAX_LANES` numbers each.
 #[derive(Debug, Default)]
 pub struct Events<S> {
-    pub(super) t: Vec<S>,
-    pub(super) face: Vec<S>,
+    pub(super) t: Column<S>,
+    pub(super) face: Column<S>,
     /// Place in the program of the leaf each belongs to.
     pub(super) leaf: Vec<u32>,
     /// How many.
@@ -27,8 +27,8 @@ impl<S: Real> Events<S> {
         let at = self.count * MAX_LANES;
         self.count += 1;
         if self.t.len() < at + MAX_LANES {
-            self.t.resize(at + MAX_LANES, S::ZERO);
-            self.face.resize(at + MAX_LANES, S::ZERO);
+            self.t.resize(at + MAX_LANES);
+            self.face.resize(at + MAX_LANES);
         }
         V::select(lanes, t, V::splat(S::INFINITY)).store(&mut self.t[at..]);
         face.store(&mut self.face[at..]);

@@ -1,7 +1,7 @@
 //! Some lanes of a vector: their numbers, and their values one after the other.
 
 use super::words::{list_bits, positions};
-use super::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, f32x16};
+use super::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, f32x16};
 use wide::u32x8;
 
 /// The numbers of the set bits of `bits`, in order.
@@ -255,7 +255,7 @@ impl Picked {
 
     /// The same of three lists.
     #[inline(always)]
-    pub fn take3<V: Lanes>(&self, from: [&Vec<V::Scalar>; 3]) -> Lanes3<V> {
+    pub fn take3<V: Lanes>(&self, from: [&Column<V::Scalar>; 3]) -> Lanes3<V> {
         [self.take(from[0]), self.take(from[1]), self.take(from[2])]
     }
 }

@@ -13,6 +13,7 @@
 //! masks are bit masks in a `u32`, bit `i` for lane `i`.
 
 pub mod chosen;
+mod column;
 mod ftz;
 pub mod functions;
 mod isa;
@@ -30,6 +31,7 @@ pub mod words;
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
+pub use column::Column;
 pub use ftz::FlushDenormals;
 pub use isa::{compiled_features, compiled_isa};
 pub use pages::ask_for_large_pages;

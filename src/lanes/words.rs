@@ -118,6 +118,12 @@ pub fn least(v: f32x16) -> f32 {
     lesser(lesser(x, z), lesser(y, w))
 }
 
+/// The greatest lane. No NaNs.
+#[inline(always)]
+pub fn greatest(v: f32x16) -> f32 {
+    -least(-v)
+}
+
 #[cfg(any(test, not(target_feature = "sse4.1")))]
 fn least_key_portable(keys: &[u16; 8]) -> (u16, usize) {
     let mut best = 0;
@@ -145,9 +151,7 @@ fn row_minima_portable(rows: &[f32x16; 16]) -> f32x16 {
     f32x16::new(std::array::from_fn(|i| {
         let mut half = rows[i].to_array();
         for step in [8, 4, 2, 1] {
-            for k in 0..step {
-                half[k] = if half[k] < half[k + step] { half[k] } else { half[k + step] };
-            }
+            (0..step).for_each(|k| half[k] = if half[k] < half[k + step] { half[k] } else { half[k + step] });
         }
         half[0]
     }))

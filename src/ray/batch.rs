@@ -5,7 +5,7 @@
 //! longer: what is behind the padding means nothing.
 
 use crate::lanes::chosen::Chosen;
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each};
+use crate::lanes::{Column, LaneMask, Lanes, Lanes3, Real, each};
 
 /// "No primitive", "no instance".
 pub const INVALID_ID: u32 = u32::MAX;
@@ -13,34 +13,25 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// Batches are padded to a multiple of this many rays (the widest packet).
 pub const PAD: usize = 16;
 
-/// Makes `column` have `len` values or more. What is left of earlier batches is not taken back, as filling it anew when it is
-/// wanted again takes time.
-pub fn at_least<T: Clone + Default>(column: &mut Vec<T>, len: usize) {
-    if column.len() < len {
-        column.resize(len, T::default());
-    }
-}
-
 /// A batch of rays, world space. `org` and `dir` hold the x, y and z arrays; directions need not be unit.
 /// A ray with `t_max < t_min`, a NaN or infinity in origin or direction, or a zero direction is dead: it misses.
 #[derive(Clone, Debug, Default)]
 pub struct Rays<S> {
     len: usize,
     /// Origins: x, y, z arrays of `padded_len` values at least.
-    pub org: [Vec<S>; 3],
+    pub org: [Column<S>; 3],
     /// Directions.
-    pub dir: [Vec<S>; 3],
+    pub dir: [Column<S>; 3],
     /// Start of the closed segment.
-    pub t_min: Vec<S>,
+    pub t_min: Column<S>,
     /// End of the closed segment; may be infinite.
-    pub t_max: Vec<S>,
+    pub t_max: Column<S>,
 }
 
 impl<S: Real> Rays<S> {
     /// `len` dead rays.
     pub fn new(len: usize) -> Self {
-        let mut rays =
-            Self { len: 0, org: Default::default(), dir: Default::default(), t_min: Vec::new(), t_max: Vec::new() };
+        let mut rays = Self::default();
         rays.reset(len);
         rays
     }
@@ -66,7 +57,7 @@ impl<S: Real> Rays<S> {
         self.len = len;
         let padded = self.padded_len();
         let arrays = self.org.iter_mut().chain(&mut self.dir).chain([&mut self.t_min, &mut self.t_max]);
-        arrays.for_each(|array| at_least(array, padded));
+        arrays.for_each(|array| array.at_least(padded));
     }
 
     /// Keeps the first `len` rays, which have been set.
@@ -149,7 +140,7 @@ impl<S: Real> Rays<S> {
     pub fn live_lanes(&self, first: usize) -> u32 {
         let load = |from: &[S]| S::Wide::load(&from[first..]);
         let zero = S::Wide::constant(0.0);
-        let nothing = |v: &[Vec<S>; 3]| load(&v[0]) * zero + load(&v[1]) * zero + load(&v[2]) * zero;
+        let nothing = |v: &[Column<S>; 3]| load(&v[0]) * zero + load(&v[1]) * zero + load(&v[2]) * zero;
         let finite = (nothing(&self.org) + nothing(&self.dir)).cmp_eq(zero);
         let [x, y, z] = each(|axis| load(&self.dir[axis]).cmp_eq(zero));
         let live = finite & !(x & y & z) & load(&self.t_min).cmp_le(load(&self.t_max));
@@ -175,45 +166,40 @@ impl<S: Real> Rays<S> {
 pub struct Hits<S> {
     len: usize,
     /// Ray parameter.
-    pub t: Vec<S>,
+    pub t: Column<S>,
     /// Triangles: weight of the second corner. Analytic shapes: number of the face that was hit (see `shape`).
-    pub u: Vec<S>,
+    pub u: Column<S>,
     /// Triangles: weight of the third corner. Analytic shapes: 0.
-    pub v: Vec<S>,
+    pub v: Column<S>,
     /// Primitive number inside the instance's object.
-    pub prim: Vec<u32>,
+    pub prim: Column<u32>,
     /// Instance number.
-    pub inst: Vec<u32>,
+    pub inst: Column<u32>,
 }
 
 impl<S: Real> Hits<S> {
     /// `len` misses.
     pub fn new(len: usize) -> Self {
-        let mut hits = Self { len: 0, t: Vec::new(), u: Vec::new(), v: Vec::new(), prim: Vec::new(), inst: Vec::new() };
+        let mut hits = Self::default();
         hits.reset(len);
         hits
     }
 
     /// Makes this `len` misses, keeping the memory.
     pub fn reset(&mut self, len: usize) {
-        let padded = len.next_multiple_of(PAD);
-        self.len = len;
+        self.prepare(len);
         for (array, fill) in [(&mut self.t, f64::INFINITY), (&mut self.u, 0.0), (&mut self.v, 0.0)] {
-            array.clear();
-            array.resize(padded, S::from_f64(fill));
+            array.fill(S::from_f64(fill));
         }
-        for array in [&mut self.prim, &mut self.inst] {
-            array.clear();
-            array.resize(padded, INVALID_ID);
-        }
+        [&mut self.prim, &mut self.inst].into_iter().for_each(|array| array.fill(INVALID_ID));
     }
 
     /// Makes this `len` hits and misses, with unspecified contents: for who writes all of them.
     pub fn prepare(&mut self, len: usize) {
         let padded = len.next_multiple_of(PAD);
         self.len = len;
-        [&mut self.t, &mut self.u, &mut self.v].into_iter().for_each(|array| array.resize(padded, S::INFINITY));
-        [&mut self.prim, &mut self.inst].into_iter().for_each(|array| array.resize(padded, INVALID_ID));
+        [&mut self.t, &mut self.u, &mut self.v].into_iter().for_each(|array| array.resize(padded));
+        [&mut self.prim, &mut self.inst].into_iter().for_each(|array| array.resize(padded));
     }
 
     /// Number of hits and misses, without padding.

@@ -6,7 +6,7 @@ pub mod packet;
 pub mod pencil;
 pub mod slab;
 
-pub use batch::{Hits, INVALID_ID, PAD, Rays, at_least};
+pub use batch::{Hits, INVALID_ID, PAD, Rays};
 pub use counters::Counters;
 pub use packet::{Candidate, HitPacket, Packet};
 pub use pencil::Pencil;

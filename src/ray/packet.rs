@@ -76,7 +76,7 @@ impl<V: Lanes> Packet<V> {
     /// The same as they are: origins and directions, start and end of the segments, lanes that are live.
     #[inline(always)]
     pub fn read(rays: &Rays<V::Scalar>, first: usize) -> ([Lanes3<V>; 2], [V; 2], u32) {
-        let load = |a: &Vec<V::Scalar>| V::load(&a[first..]);
+        let load = |a: &[V::Scalar]| V::load(&a[first..]);
         let org = [load(&rays.org[0]), load(&rays.org[1]), load(&rays.org[2])];
         let dir = [load(&rays.dir[0]), load(&rays.dir[1]), load(&rays.dir[2])];
         let (t_min, t_max) = (load(&rays.t_min), load(&rays.t_max));

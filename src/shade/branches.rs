@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use crate::lanes::chosen::Chosen;
-use crate::lanes::{Lanes, Lanes3, MAX_LANES, Real, each};
-use crate::ray::{Rays, at_least};
+use crate::lanes::{Column, Lanes, Lanes3, MAX_LANES, Real, each};
+use crate::ray::Rays;
 
 /// Rays and, parallel to them, whose they are and what of the radiance along them arrives at the eye.
 #[derive(Clone, Debug, Default)]
@@ -13,7 +13,7 @@ pub(super) struct Branches<S> {
     pub rays: Rays<S>,
     /// The sample that each belongs to.
     pub path: Vec<u32>,
-    weight: [Vec<S>; 3],
+    weight: [Column<S>; 3],
     /// Whether all of the radiance along all of them arrives: there are no weights.
     is_whole: bool,
 }
@@ -32,7 +32,7 @@ impl<S: Real> Branches<S> {
         self.path.clear();
         self.is_whole = false;
         let padded = most.next_multiple_of(MAX_LANES);
-        self.weight.iter_mut().for_each(|weight| at_least(weight, padded));
+        self.weight.iter_mut().for_each(|weight| weight.at_least(padded));
     }
 
     /// Adds those of the lanes `lanes`, which belong to the samples `path`: rays from `org` along `dir` up to `t_max`.

@@ -4,7 +4,7 @@ use super::bare::BareTriangles;
 use super::look::Looks;
 use super::place::Place;
 use crate::lanes::chosen::{lanes_of, positions_in};
-use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real, dot, each};
+use crate::lanes::{Column, LaneMask, Lanes, MAX_LANES, Real, dot, each};
 use crate::ray::{Hits, INVALID_ID, Rays};
 use crate::scene::world::World;
 
@@ -54,7 +54,7 @@ impl<S: Real> Meeting<S> {
         first: usize,
         hit: u32,
     ) -> Met<S::Wide> {
-        let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
+        let vector = |from: &[Column<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
         let (dir, t) = (vector(&rays.dir), S::Wide::load(&hits.t[first..]));
         let zero = S::Wide::constant(0.0);
         let nowhere = Place { position: [zero; 3], normal: [zero; 3], offset: zero, front: 0 };

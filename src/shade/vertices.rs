@@ -10,7 +10,7 @@ use super::meeting::{Met, met_lanes};
 use super::offset::position_error;
 use super::shader::Shader;
 use crate::lanes::chosen::{self, groups, lanes_of, merge};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, f32x16};
+use crate::lanes::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, f32x16};
 use crate::ray::{Hits, Rays};
 use crate::scene::world::Surface;
 
@@ -35,7 +35,7 @@ pub(super) const EMISSION: usize = 21;
 const FIELDS: usize = 24;
 
 /// The points of a level. Lanes of rays that met nothing mean nothing.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Vertices<S> {
     /// Of each vector of lanes: the rays that met something.
     pub lanes: Vec<u32>,
@@ -46,19 +46,7 @@ pub(super) struct Vertices<S> {
     /// Those that were worked out one by one: only vectors with such have shading normals of their own, and shares of ambient
     /// light.
     single: Vec<u32>,
-    fields: [Vec<S>; FIELDS],
-}
-
-impl<S: Real> Default for Vertices<S> {
-    fn default() -> Self {
-        Self {
-            lanes: Vec::new(),
-            shining: Vec::new(),
-            sending: Vec::new(),
-            single: Vec::new(),
-            fields: std::array::from_fn(|_| Vec::new()),
-        }
-    }
+    fields: [Column<S>; FIELDS],
 }
 
 impl<S: Real> Vertices<S> {
@@ -68,7 +56,7 @@ impl<S: Real> Vertices<S> {
         self.shining.clear();
         self.sending.clear();
         self.single.clear();
-        self.fields.iter_mut().for_each(|field| field.resize(padded, S::ZERO));
+        self.fields.iter_mut().for_each(|field| field.at_least(padded));
     }
 
     /// Vectors of lanes in which something was met: the first ray and the lanes.

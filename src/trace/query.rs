@@ -3,7 +3,7 @@
 use super::single::Waiting;
 use crate::bvh::{Child, WIDTH};
 use crate::csg;
-use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
+use crate::lanes::{Column, LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::{Candidate, Counters, HitPacket};
 
 /// What waits to be visited.
@@ -17,7 +17,7 @@ struct Entry {
 #[derive(Debug, Default)]
 pub struct Stack<S> {
     entries: Vec<Entry>,
-    near: Vec<S>,
+    near: Column<S>,
     /// What waits for a single ray.
     pub waiting: Vec<Waiting<S>>,
     /// What trees of solids need: large, and lent to every sweep.
@@ -31,10 +31,7 @@ impl<S: Real> Stack<S> {
         self.entries.reserve(bound);
         self.waiting.clear();
         self.waiting.reserve(bound);
-        let needed = bound * MAX_LANES;
-        if self.near.len() < needed {
-            self.near.resize(needed, S::ZERO);
-        }
+        self.near.at_least(bound * MAX_LANES);
     }
 
     /// Entries on the stack.

@@ -260,7 +260,7 @@ mod tests {
     fn the_seed_decides_and_nothing_else() {
         let bits = |seed| {
             let rays = scatter(&triangle(1.0), 3000, seed);
-            rays.iter().flat_map(|b| b.org[0].iter().chain(&b.dir[1]).map(|x| x.to_bits())).collect::<Vec<_>>()
+            rays.iter().flat_map(|b| b.org[0].iter().chain(b.dir[1].iter()).map(|x| x.to_bits())).collect::<Vec<_>>()
         };
         assert_eq!(bits(3), bits(3));
         assert_ne!(bits(3), bits(4));

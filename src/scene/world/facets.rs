@@ -7,7 +7,7 @@ use super::runs::{Run, Runs};
 use super::surface::{leaf_magnitude, shape_magnitude};
 use super::{World, solids};
 use crate::lanes::chosen::{lanes_of, merge, positions_in};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, f32x16, space};
+use crate::lanes::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, f32x16, space};
 use crate::math::NormalMap;
 use crate::ray::{Hits, INVALID_ID, Rays};
 use crate::scene::assembly::{AssemblyObject, PartKind};
@@ -189,7 +189,7 @@ impl<S: Real> World<S> {
         if met.hit == 0 {
             return met;
         }
-        let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
+        let vector = |from: &[Column<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
         let (org, dir, t) = (vector(&rays.org), vector(&rays.dir), S::Wide::load(&hits.t[first..]));
         met.position = each(|axis| dir[axis].mul_add(t, org[axis]));
         let faces = S::Wide::load(&hits.u[first..]);

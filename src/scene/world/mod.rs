@@ -251,6 +251,15 @@ impl<S: Real> World<S> {
         &self.objects[self.instances[0].object as usize]
     }
 
+    /// Whether something has no bounds, so that no tree holds it.
+    pub fn has_unbounded(&self) -> bool {
+        if !self.is_single_object() {
+            return !self.unbounded_instances.is_empty();
+        }
+        let Object { unbounded, unbounded_solids, .. } = self.first_object();
+        !unbounded.is_empty() || !unbounded_solids.is_empty()
+    }
+
     /// Whether shapes and solids make up more of the objects than triangles do, block by block.
     pub fn is_of_shapes(&self) -> bool {
         let (mut triangles, mut shapes) = (0, 0);

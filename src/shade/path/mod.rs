@@ -50,7 +50,7 @@ use super::spot::{Draw, Spot};
 use super::stats::BounceStats;
 use super::through::{Again, MIXTURE, Through};
 use crate::lanes::chosen::{Chosen, at, lanes_of, spill};
-use crate::lanes::{Lanes, MAX_LANES, Real, each};
+use crate::lanes::{Column, Lanes, MAX_LANES, Real, each};
 use crate::ray::{Hits, Rays};
 use crate::scene::description::{Description, Material};
 use crate::scene::material::Scattering;
@@ -338,7 +338,7 @@ impl<S: Real> PathMemory<S> {
         self.now.open(rays.len());
         let (one, certain) = (S::Wide::constant(1.0), S::Wide::splat(S::INFINITY));
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
-            let vector = |from: &[Vec<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
+            let vector = |from: &[Column<S>; 3]| each(|axis| S::Wide::load(&from[axis][first..]));
             let path: [u32; MAX_LANES] = std::array::from_fn(|lane| (first + lane) as u32);
             let chosen = Chosen::of(rays.live_lanes(first));
             self.now.push_some(&chosen, &path, [vector(&rays.org), vector(&rays.dir), [one; 3]], [certain, one]);

@@ -4,8 +4,7 @@
 use glam::DVec3;
 
 use crate::lanes::chosen::Picked;
-use crate::lanes::{Lanes, Lanes3, Real};
-use crate::ray::at_least;
+use crate::lanes::{Column, Lanes, Lanes3, Real};
 use crate::shade::place::Place;
 
 /// Points of one model.
@@ -47,7 +46,7 @@ const ROWS: usize = 10;
 /// Where the rays of a wave met surfaces, parallel to them; rays that met nothing have unspecified places.
 #[derive(Clone, Debug, Default)]
 pub struct Places<S> {
-    rows: [Vec<S>; ROWS],
+    rows: [Column<S>; ROWS],
 }
 
 /// Where the points of a packet are.
@@ -66,7 +65,7 @@ pub struct PlaceLanes<V> {
 impl<S: Real> Places<S> {
     /// Makes room for those of `padded` rays with their padding.
     pub fn open(&mut self, padded: usize) {
-        self.rows.iter_mut().for_each(|row| at_least(row, padded));
+        self.rows.iter_mut().for_each(|row| row.at_least(padded));
     }
 
     /// Sets those of rays `first..first + N`.

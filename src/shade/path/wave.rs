@@ -3,29 +3,22 @@
 use glam::DVec3;
 
 use crate::lanes::chosen::Chosen;
-use crate::lanes::{Lanes, Lanes3, Real, each};
-use crate::ray::{PAD, Rays, at_least};
+use crate::lanes::{Column, Lanes, Lanes3, Real, each};
+use crate::ray::{PAD, Rays};
 
 /// Rays and what their paths carry, in parallel.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Wave<S> {
     /// The rays; directions are unit after the first bounce.
     pub rays: Rays<S>,
     /// Path of each.
     pub path: Vec<u32>,
     /// What of the radiance along the ray reaches the eye. This and the next two may be longer than there are rays.
-    pub throughput: [Vec<S>; 3],
+    pub throughput: [Column<S>; 3],
     /// Density with which the direction was found, per solid angle; infinite if no light could be aimed at.
-    pub pdf: Vec<S>,
+    pub pdf: Column<S>,
     /// Product of the squared relative indices of refraction that the throughput was divided by.
-    pub squeeze: Vec<S>,
-}
-
-impl<S: Real> Default for Wave<S> {
-    fn default() -> Self {
-        let (path, column) = (Vec::new(), || Vec::new());
-        Self { rays: Rays::new(0), path, throughput: [column(), column(), column()], pdf: column(), squeeze: column() }
-    }
+    pub squeeze: Column<S>,
 }
 
 impl<S: Real> Wave<S> {
@@ -33,10 +26,10 @@ impl<S: Real> Wave<S> {
     pub fn open(&mut self, count: usize) {
         self.rays.open(count);
         self.path.clear();
-        self.columns().into_iter().for_each(|column| at_least(column, count.next_multiple_of(PAD)));
+        self.columns().into_iter().for_each(|column| column.at_least(count.next_multiple_of(PAD)));
     }
 
-    fn columns(&mut self) -> [&mut Vec<S>; 5] {
+    fn columns(&mut self) -> [&mut Column<S>; 5] {
         let [r, g, b] = &mut self.throughput;
         [r, g, b, &mut self.pdf, &mut self.squeeze]
     }
@@ -84,20 +77,14 @@ impl<S: Real> Wave<S> {
 }
 
 /// Shadow rays and what arrives if nothing is in between.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Shadows<S> {
     /// The rays.
     pub rays: Rays<S>,
     /// Path of each.
     pub path: Vec<u32>,
     /// What arrives at the eye.
-    pub light: [Vec<S>; 3],
-}
-
-impl<S: Real> Default for Shadows<S> {
-    fn default() -> Self {
-        Self { rays: Rays::new(0), path: Vec::new(), light: [Vec::new(), Vec::new(), Vec::new()] }
-    }
+    pub light: [Column<S>; 3],
 }
 
 impl<S: Real> Shadows<S> {
@@ -105,7 +92,7 @@ impl<S: Real> Shadows<S> {
     pub fn open(&mut self, count: usize) {
         self.rays.open(count);
         self.path.clear();
-        self.light.iter_mut().for_each(|column| at_least(column, count.next_multiple_of(PAD)));
+        self.light.iter_mut().for_each(|column| column.at_least(count.next_multiple_of(PAD)));
     }
 
     /// Adds rays: the lanes `chosen` of origins, directions, light and ends.

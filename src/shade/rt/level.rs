@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::{Carry, Path, TOLERANCE};
 use crate::lanes::chosen::{at, lanes_of, spill};
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3, space};
-use crate::ray::{Hits, Rays, at_least};
+use crate::lanes::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3, space};
+use crate::ray::{Hits, Rays};
 use crate::scene::world::World;
 use crate::shade::sample::{Rgba, Samples};
 
@@ -23,7 +23,7 @@ pub(super) fn start<V: Lanes>(org: Lanes3<V>) -> V {
 
 /// Numbers `first..first + N` of three lists.
 #[inline(always)]
-pub(super) fn vector<S: Real>(from: &[Vec<S>; 3], first: usize) -> Lanes3<S::Wide> {
+pub(super) fn vector<S: Real>(from: &[Column<S>; 3], first: usize) -> Lanes3<S::Wide> {
     [S::Wide::load(&from[0][first..]), S::Wide::load(&from[1][first..]), S::Wide::load(&from[2][first..])]
 }
 
@@ -137,13 +137,13 @@ impl<S: Real> Level<S> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Found<S> {
     /// Distance along the ray.
-    pub t: Vec<S>,
+    pub t: Column<S>,
     /// World space.
-    pub position: [Vec<S>; 3],
+    pub position: [Column<S>; 3],
     /// Unit, outward.
-    pub normal: [Vec<S>; 3],
+    pub normal: [Column<S>; 3],
     /// Number of the region.
-    pub region: Vec<u32>,
+    pub region: Column<u32>,
     /// Of each vector of lanes: those that met something.
     pub hit: Vec<u32>,
     /// Those that met it from inside.
@@ -161,8 +161,8 @@ impl<S: Real> Found<S> {
     /// Nothing yet, of `padded` rays; [`Self::set_vector`] sets some.
     pub fn open(&mut self, padded: usize) {
         let arrays = self.position.iter_mut().chain(&mut self.normal).chain([&mut self.t]);
-        arrays.for_each(|array| at_least(array, padded));
-        at_least(&mut self.region, padded);
+        arrays.for_each(|array| array.at_least(padded));
+        self.region.at_least(padded);
         self.hit.resize(padded / S::Wide::N, 0);
         self.leaving.resize(padded / S::Wide::N, 0);
     }

@@ -6,8 +6,7 @@ use super::material::RtMaterial;
 use super::parameters::{uv, uv_of_arb};
 use super::pattern::Pattern;
 use crate::lanes::chosen::positions_in;
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, space};
-use crate::ray::at_least;
+use crate::lanes::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, space};
 use crate::scene::world::World;
 
 /// What the paths of a level show where they enter regions, parallel to its rays.
@@ -16,17 +15,17 @@ pub(super) struct Meetings<S> {
     /// Of each vector of lanes.
     pub kinds: Vec<Kinds>,
     /// The regions' colours there.
-    pub base: [Vec<S>; 3],
+    pub base: [Column<S>; 3],
     /// Shine, specular and diffuse of the regions' finishes, zeros without.
-    pub finish: [Vec<S>; 3],
+    pub finish: [Column<S>; 3],
     /// What they show.
-    pub color: [Vec<S>; 3],
+    pub color: [Column<S>; 3],
     /// Unit directions to a light.
-    pub to_light: [Vec<S>; 3],
+    pub to_light: [Column<S>; 3],
     /// Of each vector of lanes: those that it may light.
     pub facing: Vec<u32>,
     /// How much of it arrives.
-    pub visible: Vec<S>,
+    pub visible: Column<S>,
 }
 
 /// Lanes of a vector by what they have entered.
@@ -50,7 +49,7 @@ impl<S: Real> Meetings<S> {
         self.kinds.clear();
         self.facing.resize(padded / S::Wide::N, 0);
         let lists = [&mut self.base, &mut self.finish, &mut self.color, &mut self.to_light];
-        lists.into_iter().flatten().chain([&mut self.visible]).for_each(|array| at_least(array, padded));
+        lists.into_iter().flatten().chain([&mut self.visible]).for_each(|array| array.at_least(padded));
     }
 
     /// The next vector of lanes, whose rays are those from `first` on: rays `entering` enter the regions of `found`, at the

@@ -10,7 +10,7 @@ use super::meetings::Meetings;
 use super::shadow::Probes;
 use super::{AIR, AMBIENT, DARK, MAX_BOUNCES, Memory, Path, Rt, TOLERANCE, Within};
 use crate::lanes::chosen::lanes_of;
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, space};
+use crate::lanes::{Column, LaneMask, Lanes, Lanes3, Real, dot, each, space};
 use crate::shade::sample::Samples;
 use crate::shade::shader::{Shader, Workspace};
 
@@ -42,7 +42,7 @@ impl<S: Real> Shader<'_, S> {
             let (first, kinds) = (k * S::Wide::N, meetings.kinds[k]);
             for i in lanes_of(kinds.sends).map(|lane| first + lane) {
                 let Some(finish) = &rt.materials[found.region[i] as usize].finish else { continue };
-                let of = |list: &[Vec<S>; 3]| DVec3::from(each(|axis| list[axis][i].to_f64()));
+                let of = |list: &[Column<S>; 3]| DVec3::from(each(|axis| list[axis][i].to_f64()));
                 let (base, color) = (of(&meetings.base), of(&meetings.color));
                 let shown = send_on(level.path(i), found, i, finish, base, color, next);
                 (0..3).for_each(|axis| meetings.color[axis][i] = S::from_f64(shown[axis]));

@@ -4,8 +4,8 @@ use super::level::{Found, start};
 use super::{Rt, TOLERANCE};
 use crate::lanes::chosen::{Chosen, lanes_of};
 use crate::lanes::words::positions;
-use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real};
-use crate::ray::{Rays, at_least};
+use crate::lanes::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real};
+use crate::ray::Rays;
 use crate::shade::shader::{Shader, Workspace};
 
 /// Partitions that begin at a ray's start and end before this, mm, are passed over.
@@ -39,7 +39,7 @@ pub(super) struct Probes<S> {
     rays: Rays<S>,
     count: usize,
     /// Numbers of the rays whose hits they start from; more than there are rays.
-    slots: Vec<u32>,
+    slots: Column<u32>,
     /// Parallel to the rays; none while they come straight from surfaces.
     passed: Vec<Passed>,
 }
@@ -51,7 +51,7 @@ impl<S: Real> Probes<S> {
         self.count = 0;
         self.passed.clear();
         // Lanes are written a vector at a time.
-        at_least(&mut self.slots, room + MAX_LANES);
+        self.slots.at_least(room + MAX_LANES);
     }
 
     /// Adds those of `lanes` from hits `first + lane`, towards the light at the unit directions `dir`; `org` is the tolerance

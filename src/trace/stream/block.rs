@@ -149,8 +149,7 @@ impl<S: Real> Job<'_, S> {
     fn whole<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
         let bounds = Bounds::<V>::of(self.rays, starts);
         if bounds.live == 0 {
-            let nothing = HitPacket::<V>::new(V::constant(0.0));
-            starts.iter().for_each(|&at| self.output.put(at, &nothing, 0));
+            self.miss::<V>(starts);
             return true;
         }
         let (bundle, shared) = bounds.bundle();
@@ -159,6 +158,13 @@ impl<S: Real> Job<'_, S> {
         let tree = if single { &world.first_object().tree } else { &world.top };
         if !bundle.is_uniform() || !self.list::<V, ANY, COUNT>(tree, &bundle) {
             return false;
+        }
+        if self.memory.block.list.is_empty() && !world.has_unbounded() {
+            if COUNT {
+                self.counters.rays += bounds.lives.iter().map(|live| u64::from(live.count_ones())).sum::<u64>();
+            }
+            self.miss::<V>(starts);
+            return true;
         }
         let vectors = starts.iter().copied().zip(bounds.lives);
         if single {
@@ -174,6 +180,12 @@ impl<S: Real> Job<'_, S> {
             });
         }
         true
+    }
+
+    /// The vectors of rays that start at `starts` meet nothing.
+    fn miss<V: Lanes<Scalar = S>>(&mut self, starts: &[usize]) {
+        let nothing = HitPacket::<V>::new(V::constant(0.0));
+        starts.iter().for_each(|&at| self.output.put(at, &nothing, 0));
     }
 
     /// Lists the leaves of `tree` that `bundle` may meet, nearest first; false if there are too many.

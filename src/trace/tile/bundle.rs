@@ -1,12 +1,12 @@
 //! What the rays of a block have in common: the point they start from, or (any-hit) the point they end in.
 
 use super::{GROUPS, HALF_ULP, Mask, SET, V, select};
-use crate::lanes::words::prefetch;
-use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
+use crate::lanes::words::{greatest, prefetch};
+use crate::lanes::{Column, LaneMask, Lanes, Lanes3, each, map3};
 use crate::ray::{Packet, Pencil, Rays};
 
 /// Directions and coordinates the tile's arithmetic is made for. Rays outside are left to the packet kernel.
-const TAME: (f32, f32) = (1e-15, 1e15);
+pub const TAME: (f32, f32) = (1e-15, 1e15);
 
 /// Groups between the one that is read (or written) and the one the memory is asked for.
 pub const AHEAD: usize = 8;
@@ -53,7 +53,7 @@ pub struct Bundle<'a> {
     pub slack: f32,
     /// Start or end.
     pub shared: Shared,
-    /// That they are tame and start in one point is still to be seen.
+    /// That they are tame and of the common point is still to be seen ([`super::presumed`]).
     pub presumed: bool,
     /// Groups of 16 rays.
     pub len: usize,
@@ -69,8 +69,14 @@ const MOST_SHEAR: f64 = 2.0;
 
 /// Loads a vector of each of three arrays.
 #[inline(always)]
-pub fn load3(arrays: &[Vec<f32>; 3], at: usize) -> Lanes3<V> {
+pub fn load3(arrays: &[Column<f32>; 3], at: usize) -> Lanes3<V> {
     [V::load(&arrays[0][at..]), V::load(&arrays[1][at..]), V::load(&arrays[2][at..])]
+}
+
+/// The largest component of each vector, absolute.
+#[inline(always)]
+pub fn largest(v: Lanes3<V>) -> V {
+    v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs())
 }
 
 /// Number of groups of 16 in the `N` sets that start with ray `first`.
@@ -110,30 +116,6 @@ impl<'a> Bundle<'a> {
         group.tame[0] != 0 && !group.share(rays, any)
     }
 
-    /// `N` sets of rays that all start in one point, as far as the first group tells: who loads them looks at the others
-    /// ([`Self::is_plain`]). `None` if they do not.
-    #[inline(always)]
-    pub fn presumed<const N: usize>(rays: &'a Rays<f32>, first: usize) -> Option<Self> {
-        let mut bundle = Self::unsorted(rays, first, groups::<N>(rays, first));
-        bundle.apex = rays.org(first);
-        bundle.tame[..bundle.len].fill(V::ALL);
-        bundle.presumed = true;
-        let is_tame = bundle.apex.iter().all(|x| x.abs() <= TAME.1);
-        (is_tame && bundle.is_plain(0, bundle.ways(0), bundle.ends(0)).bits() == V::ALL).then_some(bundle)
-    }
-
-    /// Lanes of a group that are surely tame and start in the common point.
-    #[inline(always)]
-    pub fn is_plain(&self, g: usize, dir: Lanes3<V>, [t_min, t_max]: [V; 2]) -> Mask {
-        let Source::Batch(rays) = self.source else { return Mask::from_bits(V::ALL) };
-        let org = load3(&rays.org, self.first + g * V::N);
-        let size = dir[0].abs() + dir[1].abs() + dir[2].abs();
-        let same = |a: usize| org[a].cmp_eq(V::splat(self.apex[a]));
-        let (least, most) = (V::splat(3.0 * TAME.0), V::splat(TAME.1));
-        let fits = least.cmp_le(size) & size.cmp_le(most) & V::constant(0.0).cmp_le(t_min) & t_min.cmp_le(t_max);
-        same(0) & same(1) & same(2) & fits
-    }
-
     /// Groups of rays, nothing known of them.
     pub fn unsorted(rays: &'a Rays<f32>, first: usize, len: usize) -> Self {
         Self {
@@ -170,7 +152,7 @@ impl<'a> Bundle<'a> {
 
     /// Finds the common point of the groups; whether there is one.
     #[inline(always)]
-    fn share(&mut self, rays: &Rays<f32>, any: bool) -> bool {
+    pub fn share(&mut self, rays: &Rays<f32>, any: bool) -> bool {
         let Some(leader) = (0..self.len).find(|&g| self.tame[g] != 0) else { return false };
         let leader = self.first + leader * V::N + self.tame[leader].trailing_zeros() as usize;
         self.apex = rays.org(leader);
@@ -284,13 +266,15 @@ impl<'a> Bundle<'a> {
     #[inline(always)]
     pub fn sort_group(&mut self, rays: &Rays<f32>, g: usize) {
         let (least, most) = (V::splat(TAME.0), V::splat(TAME.1));
-        let size = |v: Lanes3<V>| v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs());
         let finite = |v: Lanes3<V>| v[0].abs().cmp_le(most) & v[1].abs().cmp_le(most) & v[2].abs().cmp_le(most);
         let at = self.first + g * V::N;
         let (org, dir) = (load3(&rays.org, at), load3(&rays.dir, at));
         let (t_min, t_max) = (V::load(&rays.t_min[at..]), V::load(&rays.t_max[at..]));
-        let tame =
-            finite(org) & finite(dir) & least.cmp_le(size(dir)) & V::constant(0.0).cmp_le(t_min) & t_min.cmp_le(t_max);
+        let tame = finite(org)
+            & finite(dir)
+            & least.cmp_le(largest(dir))
+            & V::constant(0.0).cmp_le(t_min)
+            & t_min.cmp_le(t_max);
         self.tame[g] = tame.bits();
         if self.tame[g] != V::ALL {
             self.odd[g] = Packet::<V>::load(rays, at).2 & !self.tame[g];
@@ -307,8 +291,7 @@ impl<'a> Bundle<'a> {
         })
     }
 
-    /// Where ray `leader` ends, and how far the others pass it, if that can be rounding: at most 64 half ulps of the
-    /// largest coordinate.
+    /// Where ray `leader` ends, and how far the others pass it, if that can be rounding.
     fn common_end(&self, rays: &Rays<f32>, at: At, leader: usize) -> Option<([f32; 3], f32)> {
         let parameter = match at {
             At::One => 1.0,
@@ -316,25 +299,63 @@ impl<'a> Bundle<'a> {
         };
         let (org, dir) = (rays.org(leader), rays.dir(leader));
         let apex = each(|a| dir[a] * parameter + org[a]);
-        let (mut apart, mut size, mut fits) = (V::constant(0.0), V::constant(0.0), true);
+        let (mut passing, mut fits) = (Passing::default(), true);
         for g in 0..self.len {
             let first = self.first + g * V::N;
-            let (org, dir) = (load3(&rays.org, first), load3(&rays.dir, first));
             let t_max = V::load(&rays.t_max[first..]);
-            let (t, usable) = match at {
-                At::One => (V::constant(1.0), t_max.cmp_le(V::constant(1.0))),
-                At::Limit => (t_max, t_max.cmp_le(V::splat(TAME.1)) & V::splat(TAME.0).cmp_le(t_max)),
-            };
-            fits &= self.tame[g] & !usable.bits() == 0;
-            let lanes = Mask::from_bits(self.tame[g]);
-            // Differences first: the sum would hide what it rounds away.
-            let miss = each(|a| dir[a].mul_add(t, org[a] - V::splat(apex[a])).abs());
-            let largest = org[0].abs().fast_max(org[1].abs()).fast_max(org[2].abs());
-            apart = select(lanes, miss[0] + miss[1] + miss[2], apart).fast_max(apart);
-            size = select(lanes, largest, size).fast_max(size);
+            fits &= self.tame[g] & !at.is_usable(t_max).bits() == 0;
+            let lines = [load3(&rays.org, first), load3(&rays.dir, first)];
+            passing.add(at, apex, lines, t_max, Mask::from_bits(self.tame[g]));
         }
-        let largest = |v: V| v.to_array().into_iter().fold(0.0, f32::max);
-        let size = apex.iter().fold(largest(size), |m, x| x.abs().max(m));
-        (fits && largest(apart) <= 64.0 * HALF_ULP * size).then_some((apex, largest(apart)))
+        passing.slack(apex).filter(|_| fits).map(|slack| (apex, slack))
+    }
+}
+
+impl At {
+    /// Rays whose end, by their `t_max`, may be a common one.
+    #[inline(always)]
+    pub fn is_usable(self, t_max: V) -> Mask {
+        match self {
+            Self::One => t_max.cmp_le(V::constant(1.0)),
+            Self::Limit => t_max.cmp_le(V::splat(TAME.1)) & V::splat(TAME.0).cmp_le(t_max),
+        }
+    }
+}
+
+/// How far rays pass a common end.
+#[derive(Clone, Copy, Debug)]
+pub struct Passing {
+    /// Sums over the axes, the largest by lane.
+    apart: V,
+    /// Largest coordinates of their origins.
+    size: V,
+}
+
+impl Default for Passing {
+    fn default() -> Self {
+        Self { apart: V::constant(0.0), size: V::constant(0.0) }
+    }
+}
+
+impl Passing {
+    /// Adds some lanes of a vector of rays.
+    #[inline(always)]
+    pub fn add(&mut self, at: At, apex: [f32; 3], [org, dir]: [Lanes3<V>; 2], t_max: V, lanes: Mask) {
+        let t = match at {
+            At::One => V::constant(1.0),
+            At::Limit => t_max,
+        };
+        // Differences first: the sum would hide what it rounds away.
+        let miss = each(|a| dir[a].mul_add(t, org[a] - V::splat(apex[a])).abs());
+        self.apart = select(lanes, miss[0] + miss[1] + miss[2], self.apart).fast_max(self.apart);
+        self.size = select(lanes, largest(org), self.size).fast_max(self.size);
+    }
+
+    /// How far all pass at most, if that can be rounding: at most 64 half ulps of the largest coordinate.
+    #[inline(always)]
+    pub fn slack(&self, apex: [f32; 3]) -> Option<f32> {
+        let size = apex.iter().fold(greatest(self.size), |m, x| x.abs().max(m));
+        let apart = greatest(self.apart);
+        (apart <= 64.0 * HALF_ULP * size).then_some(apart)
     }
 }

@@ -78,10 +78,10 @@ impl Frame {
                     // Of the `N` groups here the first that is of the tile.
                     let here = groups >> (N * i) & ((1 << N) - 1);
                     let g = N * i + if here == 0 { 0 } else { here.trailing_zeros() as usize };
-                    (g, (bundle.tame[g].trailing_zeros() as usize).min(V::N - 1))
+                    (g, (bundle.live(rays, g).trailing_zeros() as usize).min(V::N - 1))
                 }
             };
-            if groups >> g & 1 == 0 || bundle.tame[g] >> lane & 1 == 0 {
+            if groups >> g & 1 == 0 || bundle.live(rays, g) >> lane & 1 == 0 {
                 continue;
             }
             used |= 1 << i;

@@ -1,9 +1,10 @@
 //! The rays of a tile: up to 64 groups of 16 (4x4 pixels), each ray as (s, t), its depth as 1/z between two bounds.
 
-use super::bundle::{AHEAD, At, Bundle, Shared, Source};
+use super::bundle::{AHEAD, At, Bundle, Shared, Source, largest};
 use super::frame::Frame;
+use super::presumed::Look;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
-use crate::lanes::words::{least, row_minima};
+use crate::lanes::words::{greatest, least, row_minima};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::math::Aabb;
 use crate::scene::world::World;
@@ -153,7 +154,7 @@ struct Lines {
     reach: V,
     /// See [`Groups::behind`].
     behind: V,
-    /// See [`Groups::endless`].
+    /// Segments have both of their natural ends: 0, and infinity or the common end.
     whole: bool,
 }
 
@@ -161,9 +162,9 @@ impl Groups {
     /// Takes in some groups of the first `N` sets of a bundle that looks at `world`. False if they spread too wide for one
     /// frame (nothing is traced then).
     #[inline(always)]
-    pub fn load<const N: usize, const EXACT: bool>(
+    pub fn load<const N: usize, const ANY: bool, const EXACT: bool>(
         &mut self,
-        bundle: &Bundle,
+        bundle: &mut Bundle,
         groups: u64,
         world: &World<f32>,
     ) -> bool {
@@ -177,6 +178,7 @@ impl Groups {
         let most = V::splat(f32::INFINITY);
         let (mut near, mut reach, mut front) = (most, V::splat(0.0), most);
         self.endless = true;
+        let mut look = Look::default();
         for q in 0..N {
             let mut lows = [[most; SET]; 2];
             // Greatest values as least negatives: one kind of shuffle tree does both.
@@ -184,16 +186,18 @@ impl Groups {
             for i in 0..SET {
                 let g = q * SET + i;
                 self.of[g].slot = [NO_SLOT; 16];
-                if groups >> g & 1 == 0 || bundle.tame[g] == 0 {
+                let mut tame = if groups >> g & 1 != 0 { bundle.tame[g] } else { 0 };
+                if bundle.presumed && tame != 0 {
+                    bundle.prefetch(g + AHEAD);
+                    let Some(lanes) = bundle.look::<ANY>(g, &mut look) else { return false };
+                    (tame, bundle.tame[g]) = (lanes, lanes);
+                }
+                if tame == 0 {
                     (self.of[g].inv_lo, self.of[g].inv_hi) = (most, most);
                     continue;
                 }
-                if bundle.presumed {
-                    bundle.prefetch(g + AHEAD);
-                }
-                let lines = self.lines(bundle, g);
+                let lines = self.lines(bundle, g, tame);
                 self.endless &= lines.whole;
-                let tame = bundle.tame[g];
                 if tame & !lines.fit != 0 {
                     return false;
                 }
@@ -206,8 +210,12 @@ impl Groups {
                 lows[1][i] = select(lanes, lines.t, most);
                 highs[0][i] = select(lanes, -lines.s, most);
                 highs[1][i] = select(lanes, -lines.t, most);
-                near = select(lanes, lines.near, most).fast_min(near);
-                reach = select(lanes, lines.reach, reach).fast_max(reach);
+                if !lines.whole {
+                    near = select(lanes, lines.near, most).fast_min(near);
+                }
+                if ANY {
+                    reach = select(lanes, lines.reach, reach).fast_max(reach);
+                }
                 if bundle.shared == Shared::Behind {
                     self.behind[g] = lines.behind;
                     front = select(lanes, lines.behind / lines.slowness, front).fast_min(front);
@@ -220,6 +228,9 @@ impl Groups {
                 self.rect[axis][1][q] = -row_minima(&highs[axis]);
             }
         }
+        if ANY && bundle.presumed && !bundle.confirm(&look) {
+            return false;
+        }
         self.bounds = [0, 1].map(|axis| {
             let [lo, hi] = &self.rect[axis];
             [
@@ -228,6 +239,9 @@ impl Groups {
             ]
         });
         self.wide = self.bounds.iter().flatten().fold(0.0, |w, x| x.abs().max(w));
+        if self.wide >= WIDEST {
+            return false;
+        }
         for axis in 0..2 {
             let [lo, hi] = self.bounds[axis];
             let scale = V::splat(if hi > lo { 1.0 / (hi - lo) } else { 0.0 });
@@ -297,42 +311,36 @@ impl Groups {
         2.0 * square / (depth * depth) * (N * SET * V::N) as f32 / (s * t)
     }
 
+    /// The lines of lanes `tame` of a group.
     #[inline(always)]
-    fn lines(&self, bundle: &Bundle, g: usize) -> Lines {
-        let (zero, one) = (V::constant(0.0), V::constant(1.0));
+    fn lines(&self, bundle: &Bundle, g: usize, tame: u32) -> Lines {
+        let (zero, one, infinite) = (V::constant(0.0), V::constant(1.0), V::splat(f32::INFINITY));
         if let Source::Pencil(pencil, middle) = bundle.source {
             let [s, t] = pencil.places.around(bundle.first / V::N + g, middle);
-            let (s, t) = (V::new(s), V::new(t));
-            let (slowness, near) = (V::splat(1.0 / self.frame.scale), V::splat(f32::INFINITY));
-            let fit = s.abs().cmp_lt(V::splat(WIDEST)) & t.abs().cmp_lt(V::splat(WIDEST));
-            return Lines { s, t, slowness, far: zero, near, fit: fit.bits(), reach: zero, behind: zero, whole: true };
+            let slowness = V::splat(1.0 / self.frame.scale);
+            let (s, t, near, fit) = (V::new(s), V::new(t), infinite, V::ALL);
+            return Lines { s, t, slowness, far: zero, near, fit, reach: zero, behind: zero, whole: true };
         }
         let direction = bundle.ways(g);
         let [x, y, speed] = self.frame.coordinates(direction);
         let slowness = one / speed;
         let (s, t) = (x * slowness, y * slowness);
-        let (widest, most) = (V::splat(WIDEST), V::splat(f32::MAX));
-        let mut fit = s.abs().cmp_lt(widest) & t.abs().cmp_lt(widest);
-        fit = fit & zero.cmp_lt(speed) & zero.cmp_lt(slowness) & slowness.cmp_lt(most);
-        let mut behind = zero;
+        let mut fit = zero.cmp_lt(slowness) & slowness.cmp_lt(V::splat(f32::MAX));
         let [t_min, t_max] = bundle.ends(g);
-        if bundle.presumed {
-            fit = fit & bundle.is_plain(g, direction, [t_min, t_max]);
-        }
-        let infinite = V::splat(f32::INFINITY);
-        let whole = bundle.shared == Shared::Start && (zero.cmp_eq(t_min) & infinite.cmp_eq(t_max)).bits() == V::ALL;
-        if whole {
-            return Lines { s, t, slowness, far: zero, near: infinite, fit: fit.bits(), reach: zero, behind, whole };
-        }
-        let (far, near, reach) = match bundle.shared {
+        // Most segments are whole: all that a ray or the way to a light has. They need no divisions.
+        let is_whole = |end: V| (zero.cmp_eq(t_min) & end.cmp_eq(t_max)).bits() & tame == tame;
+        let mut behind = zero;
+        let (far, near, reach, whole) = match bundle.shared {
+            Shared::Start if is_whole(infinite) => (zero, infinite, zero, true),
+            Shared::End(At::One) if is_whole(one) => (slowness, infinite, largest(direction), true),
+            Shared::Start => (slowness / t_max, slowness / t_min, zero, false),
             Shared::Behind => {
                 let starts = bundle.starts(g);
                 let way = each(|a| starts[a] - V::splat(bundle.apex[a]));
                 behind = dot(way, direction) / dot(direction, direction);
                 // Where a segment starts is told by the start itself.
-                (slowness / (t_max + behind), V::splat(f32::INFINITY), zero)
+                (slowness / (t_max + behind), infinite, zero, false)
             }
-            Shared::Start => (slowness / t_max, slowness / t_min, zero),
             Shared::End(at) => {
                 let scale = match at {
                     At::One => one,
@@ -342,8 +350,7 @@ impl Groups {
                 // to a few ulps as long as at least a quarter is left.
                 let (start, end) = (one - t_min * scale, one - t_max * scale);
                 fit = fit & V::constant(0.25).cmp_le(start);
-                let size = direction[0].abs().fast_max(direction[1].abs()).fast_max(direction[2].abs());
-                (slowness / start, slowness / zero.fast_max(end), size)
+                (slowness / start, slowness / zero.fast_max(end), largest(direction), false)
             }
         };
         Lines { s, t, slowness, far, near, fit: fit.bits(), reach, behind, whole }
@@ -390,9 +397,4 @@ pub fn splats(bounds: &[[f32; 2]; 2]) -> [[V; 2]; 2] {
 pub fn bounded(inv_lo: V) -> V {
     let infinite = V::splat(f32::INFINITY).cmp_le(inv_lo);
     select(infinite, V::splat(f32::MAX), inv_lo)
-}
-
-#[inline(always)]
-fn greatest(v: V) -> f32 {
-    -least(-v)
 }

@@ -8,10 +8,10 @@
 
 use glam::{DMat3, DVec3};
 
-use super::bundle::{Bundle, Shared, groups, load3};
+use super::bundle::{Bundle, Shared, groups, largest, load3};
 use super::{GROUPS, HALF_ULP, Job, Mask, SET, SETS, V, select};
 use crate::lanes::chosen::merge_lists;
-use crate::lanes::words::positions;
+use crate::lanes::words::{greatest, positions};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each};
 use crate::ray::{HitPacket, Hits, INVALID_ID, Rays};
 use crate::trace::output::Output;
@@ -153,9 +153,8 @@ impl<'a> Search<'a> {
         if count < LEAST {
             return None;
         }
-        let slack = slack.to_array().into_iter().fold(0.0, f32::max);
         let unsorted = Bundle::unsorted(self.rays, first, len);
-        Some(Bundle { apex, slack, shared: Shared::Behind, tame, ..unsorted })
+        Some(Bundle { apex, slack: greatest(slack), shared: Shared::Behind, tame, ..unsorted })
     }
 
     /// Free rays of a group whose lines pass `apex` behind their starts, at `close` half ulps; and how far at most.
@@ -184,12 +183,6 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The largest component of each vector, absolute.
-#[inline(always)]
-fn largest(v: Lanes3<V>) -> V {
-    v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs())
-}
-
 /// The point nearest to the lines of some rays, by least squares.
 fn meeting_point(rays: &Rays<f32>, sample: &[usize]) -> Option<[f32; 3]> {
     let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
@@ -215,12 +208,12 @@ impl Job<'_> {
         let Some(mut search) = Search::new(self.rays, first) else { return false };
         let mut done = [0; GROUPS];
         let len = search.all.len;
-        while let Some(bundle) = search.bundle() {
+        while let Some(mut bundle) = search.bundle() {
             let groups = bundle.groups();
             for g in (0..len).filter(|&g| groups >> g & 1 != 0 && done[g] == 0 && bundle.tame[g] != V::ALL) {
                 self.miss(first + g * V::N);
             }
-            let traced = self.behind::<EXACT, COUNT>(&bundle, groups);
+            let traced = self.behind::<EXACT, COUNT>(&mut bundle, groups);
             for g in (0..len).filter(|g| traced >> g & 1 != 0) {
                 done[g] |= bundle.tame[g];
             }
@@ -250,14 +243,14 @@ impl Job<'_> {
 
     /// Traces the rays of a point as one tile, or as one for each set. Returns the groups that were traced: others spread too
     /// wide.
-    fn behind<const EXACT: bool, const COUNT: bool>(&mut self, bundle: &Bundle, groups: u64) -> u64 {
+    fn behind<const EXACT: bool, const COUNT: bool>(&mut self, bundle: &mut Bundle, groups: u64) -> u64 {
         if self.tile::<SETS, false, EXACT, COUNT>(bundle, groups) {
             return groups;
         }
         let mut traced = 0;
         for q in 0..SETS {
             let here = groups >> (SET * q) & 0xffff;
-            if here != 0 && self.tile::<1, false, EXACT, COUNT>(&bundle.set(q), here) {
+            if here != 0 && self.tile::<1, false, EXACT, COUNT>(&mut bundle.set(q), here) {
                 traced |= here << (SET * q);
             }
         }

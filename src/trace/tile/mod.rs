@@ -26,6 +26,7 @@ mod node;
 mod own;
 mod pairs;
 mod place;
+mod presumed;
 mod shapes;
 mod slab;
 mod walk;
@@ -38,6 +39,7 @@ use crate::ray::{Counters, HitPacket, Packet, Pencil, Rays};
 use crate::scene::world::{Object, World};
 use bundle::{Bundle, Shared};
 use exact::Exact;
+use presumed::First;
 
 /// A group's rays: the vector of the whole engine.
 type V = f32x16;
@@ -171,16 +173,25 @@ impl<'a> Job<'a> {
                 self.leave::<SETS>(first);
                 continue;
             }
-            if self.most == GROUPS && self.presumed::<ANY, EXACT, COUNT>(first) {
+            let mut look = match self.most == GROUPS {
+                true => First::of(self.rays, first, ANY),
+                false => First::Mixed,
+            };
+            if let First::Shared(bundle) = &mut look
+                && self.presumed::<ANY, EXACT, COUNT>(bundle)
+            {
                 continue;
             }
-            // Rays whose first group has no point in common have none in a set of theirs either, most probably.
-            let scattered = self.most == GROUPS && Bundle::is_scattered(self.rays, first, ANY);
+            if let First::Dead = look {
+                self.leave::<SETS>(first);
+                continue;
+            }
+            let scattered = matches!(look, First::Scattered);
             if self.most == GROUPS
                 && !scattered
-                && let Some(bundle) = Bundle::find::<SETS>(self.rays, first, ANY)
+                && let Some(mut bundle) = Bundle::find::<SETS>(self.rays, first, ANY)
             {
-                self.block::<ANY, EXACT, COUNT>(&bundle);
+                self.block::<ANY, EXACT, COUNT>(&mut bundle);
                 continue;
             }
             if mirrors && self.mirrored::<EXACT, COUNT>(first) {
@@ -195,7 +206,7 @@ impl<'a> Job<'a> {
             }
             for first in (first..self.rays.len().min(first + BLOCK)).step_by(SET * V::N) {
                 match Bundle::find::<1>(self.rays, first, ANY) {
-                    Some(bundle) => self.block::<ANY, EXACT, COUNT>(&bundle),
+                    Some(mut bundle) => self.block::<ANY, EXACT, COUNT>(&mut bundle),
                     None => self.leave::<1>(first),
                 }
             }
@@ -214,13 +225,12 @@ impl<'a> Job<'a> {
         self.memory.rest.clear();
     }
 
-    /// Traces a block whose rays all start in one point, as most do, after one look at them; false if they do not, or spread
-    /// too wide.
-    fn presumed<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, first: usize) -> bool {
-        let Some(bundle) = Bundle::presumed::<SETS>(self.rays, first) else { return false };
+    /// Traces a block after one look at its rays; false if they are not what was presumed, or spread too wide.
+    fn presumed<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &mut Bundle) -> bool {
+        let groups = bundle.groups();
         match bundle.len <= SET {
-            true => self.tile::<1, ANY, EXACT, COUNT>(&bundle, bundle.groups()),
-            false => self.tile::<SETS, ANY, EXACT, COUNT>(&bundle, bundle.groups()),
+            true => self.tile::<1, ANY, EXACT, COUNT>(bundle, groups),
+            false => self.tile::<SETS, ANY, EXACT, COUNT>(bundle, groups),
         }
     }
 
@@ -229,14 +239,14 @@ impl<'a> Job<'a> {
         if EXACT || self.most != GROUPS || !suits(self.world, EXACT) {
             return false;
         }
-        let Some(bundle) = Bundle::of_pencil(pencil) else { return false };
+        let Some(mut bundle) = Bundle::of_pencil(pencil) else { return false };
         self.make_levels();
         self.memory.slabs.forget();
         // Those without a live ray too: their misses are written.
         let groups = u64::MAX >> (GROUPS - bundle.len);
         let traced = match bundle.len <= SET {
-            true => self.tile::<1, false, EXACT, COUNT>(&bundle, groups),
-            false => self.tile::<SETS, false, EXACT, COUNT>(&bundle, groups),
+            true => self.tile::<1, false, EXACT, COUNT>(&mut bundle, groups),
+            false => self.tile::<SETS, false, EXACT, COUNT>(&mut bundle, groups),
         };
         let is_done = traced && self.memory.rest.is_empty();
         self.memory.rest.clear();
@@ -257,7 +267,7 @@ impl<'a> Job<'a> {
     }
 
     /// Traces a block as one tile or as one for each set.
-    fn block<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &Bundle) {
+    fn block<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &mut Bundle) {
         let all = bundle.groups();
         for g in (0..bundle.len).filter(|g| all >> g & 1 == 0) {
             self.packet::<ANY, COUNT>(bundle.first + g * V::N);
@@ -266,12 +276,12 @@ impl<'a> Job<'a> {
             return;
         }
         for q in (0..SETS).filter(|q| all >> (q * SET) & 0xffff != 0) {
-            self.set::<ANY, EXACT, COUNT>(&bundle.set(q), all >> (q * SET) & 0xffff);
+            self.set::<ANY, EXACT, COUNT>(&mut bundle.set(q), all >> (q * SET) & 0xffff);
         }
     }
 
     /// Traces some groups of one set as one tile, or as four or sixteen where its rays spread too wide, or as packets.
-    fn set<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &Bundle, all: u64) {
+    fn set<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &mut Bundle, all: u64) {
         if self.most >= SET && self.tile::<1, ANY, EXACT, COUNT>(bundle, all) {
             return;
         }
@@ -291,13 +301,13 @@ impl<'a> Job<'a> {
     #[inline(always)]
     fn tile<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
         &mut self,
-        bundle: &Bundle,
+        bundle: &mut Bundle,
         groups: u64,
     ) -> bool {
         if groups == 0 {
             return true;
         }
-        if !self.memory.groups.load::<N, EXACT>(bundle, groups, self.world) {
+        if !self.memory.groups.load::<N, ANY, EXACT>(bundle, groups, self.world) {
             return false;
         }
         let exact = Exact { bundle, world: self.world, object: self.world.first_object() };
