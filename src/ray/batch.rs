@@ -147,6 +147,13 @@ impl<S: Real> Rays<S> {
         live.bits() & S::Wide::ALL
     }
 
+    /// The same of a vector of any width.
+    #[inline(always)]
+    pub fn live_vector<V: Lanes<Scalar = S>>(&self, first: usize) -> u32 {
+        let parts = (0..V::N).step_by(S::Wide::N);
+        parts.fold(0, |live, lane| live | self.live_lanes(first + lane) << lane) & V::ALL
+    }
+
     /// Number of live rays.
     pub fn live_count(&self) -> usize {
         // The padding is dead.

@@ -89,28 +89,33 @@ impl<V: Lanes> Bounds<V> {
     /// Of the live rays of the vectors that start at `starts`.
     #[inline(always)]
     fn of(rays: &Rays<V::Scalar>, starts: &[usize]) -> Self {
-        let none = (V::splat(V::Scalar::INFINITY), V::splat(V::Scalar::LOWEST));
-        let mut bounds = Self { org: [none; 3], dir: [none; 3], t: none, live: 0, lives: [0; SIZES[0]] };
-        for (&at, of_vector) in starts.iter().zip(&mut bounds.lives) {
-            let ([org, dir], [t_min, t_max], live) = Packet::<V>::read(rays, at);
-            *of_vector = live;
-            bounds.live |= live;
-            if live == V::ALL {
-                let wider = |(low, high): (V, V), x: V| (x.fast_min(low), x.fast_max(high));
-                bounds.org = each(|axis| wider(bounds.org[axis], org[axis]));
-                bounds.dir = each(|axis| wider(bounds.dir[axis], dir[axis]));
-                bounds.t = (t_min.fast_min(bounds.t.0), t_max.fast_max(bounds.t.1));
-            } else if live != 0 {
-                let live = V::Mask::from_bits(live);
-                let low = |low: V, x: V| V::select(live, x, none.0).fast_min(low);
-                let high = |high: V, x: V| V::select(live, x, none.1).fast_max(high);
-                let wider = |(least, most): (V, V), x: V| (low(least, x), high(most, x));
-                bounds.org = each(|axis| wider(bounds.org[axis], org[axis]));
-                bounds.dir = each(|axis| wider(bounds.dir[axis], dir[axis]));
-                bounds.t = (low(bounds.t.0, t_min), high(bounds.t.1, t_max));
-            }
+        let mut lives = [0; SIZES[0]];
+        for (&at, live) in starts.iter().zip(&mut lives) {
+            *live = rays.live_vector::<V>(at);
         }
-        bounds
+        let all = lives.iter().take(starts.len()).all(|&live| live == V::ALL);
+        // Column by column: the numbers of all at once are more than there are registers.
+        let range = |column: &[V::Scalar]| {
+            let (mut low, mut high) = (V::splat(V::Scalar::INFINITY), V::splat(V::Scalar::LOWEST));
+            let none = (low, high);
+            for (&at, &live) in starts.iter().zip(&lives) {
+                let x = V::load(&column[at..]);
+                if all {
+                    (low, high) = (x.fast_min(low), x.fast_max(high));
+                } else {
+                    let live = V::Mask::from_bits(live);
+                    (low, high) = (V::select(live, x, none.0).fast_min(low), V::select(live, x, none.1).fast_max(high));
+                }
+            }
+            (low, high)
+        };
+        Self {
+            org: each(|axis| range(&rays.org[axis])),
+            dir: each(|axis| range(&rays.dir[axis])),
+            t: (range(&rays.t_min).0, range(&rays.t_max).1),
+            live: lives.iter().fold(0, |any, live| any | live),
+            lives,
+        }
     }
 
     /// As one bundle of lines, and whether they all have one direction.
