@@ -71,7 +71,7 @@ pub struct Groups {
     pub many: bool,
     /// In such worlds: instance of the best hit, or [`NO_SLOT`].
     pub inst: [[u32; 16]; GROUPS],
-    /// All segments are whole rays, from 0 on without an end.
+    /// All segments are whole: from 0 on without an end, or to the common end.
     pub endless: bool,
     /// Some segment ends before the common point.
     pub ends_early: bool,
