@@ -8,7 +8,6 @@ use std::path::Path;
 use super::planes::{COLOR, Film, PlaneData};
 use super::{input, write_atomically};
 use crate::error::{Error, Result};
-use crate::lanes::f64x8;
 
 /// Bytes of a pixel.
 const CHANNELS: usize = 3;
@@ -21,18 +20,15 @@ pub fn level(value: f64) -> u8 {
 
 /// The [`level`]s of `values` times `gain`, one for each, as many as there are of both.
 pub fn levels(values: &[f32], gain: f64, to: &mut [u8]) {
-    let splat = f64x8::splat;
-    // Whole numbers behind this have their lowest bits in its lowest bits.
+    // Whole numbers behind this have their lowest bits in its lowest bits: there are instructions for that.
     let behind = f64::from_bits(0x4330_0000_0000_0000);
-    let (chunks, rest) = values.as_chunks::<8>();
-    let (parts, ends) = to.as_chunks_mut::<8>();
-    for (values, part) in chunks.iter().zip(parts) {
-        let scaled = f64x8::new(values.map(f64::from)) * splat(gain) * splat(255.0) + splat(0.5);
-        // The first of the two is the other one where it is not a number.
-        let whole = scaled.fast_max(splat(0.0)).fast_min(splat(255.0)).trunc() + splat(behind);
-        *part = whole.to_array().map(|x| x.to_bits() as u8);
+    for (to, &value) in to.iter_mut().zip(values) {
+        let scaled = f64::from(value) * gain * 255.0 + 0.5;
+        // Nothing is below, and what is not a number.
+        let scaled = if scaled > 0.0 { scaled } else { 0.0 };
+        let scaled = if scaled < 255.0 { scaled } else { 255.0 };
+        *to = (scaled.trunc() + behind).to_bits() as u8;
     }
-    rest.iter().zip(ends).for_each(|(&value, to)| *to = level(f64::from(value) * gain));
 }
 
 /// The colour planes as the bytes of a `.pix` file of the data window's size: linear colour times 2^`exposure`, see
