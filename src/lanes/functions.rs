@@ -48,23 +48,27 @@ pub fn fraction<V: Lanes>(x: V) -> V {
     V::select(from_nearest.cmp_lt(zero), from_nearest + V::constant(1.0), from_nearest)
 }
 
-/// Sine of `x` full turns; of numbers as in [`round`]. Within 8e-13, beside roundings: the polynomial through eight Chebyshev nodes
-/// of sin(2 pi sqrt u) / (sqrt u (1/4 - u)), so that zeros are exact.
+/// The nearest multiple of 1 / `steps`, a power of two; of numbers as in [`round`], divided by `steps`.
 #[inline(always)]
-pub fn sine_of_turns<V: Lanes>(x: V) -> V {
+pub fn to_steps<V: Lanes>(x: V, steps: f64) -> V {
+    let large = V::constant(0.75 / V::Scalar::EPSILON.to_f64() / steps);
+    (x + large) - large
+}
+
+/// Sine of `x` full turns, half a turn at most. Within 4e-9, beside roundings: the polynomial through six Chebyshev nodes of
+/// sin(2 pi sqrt u) / (sqrt u (1/4 - u)), so that zeros are exact.
+#[inline(always)]
+pub fn sine_of_part<V: Lanes>(x: V) -> V {
     let terms = [
-        25.132_741_228_713_366,
-        -64.835_844_044_275_177,
-        67.077_620_702_961_186,
-        -38.512_948_467_955_384,
-        14.182_846_042_099_464,
-        -3.645_823_182_027_419_9,
-        0.688_365_812_382_055_29,
-        -0.090_171_783_967_096_145,
+        25.132_741_154_710_772,
+        -64.835_822_721_475_301,
+        67.076_623_066_421_579,
+        -38.495_830_637_736_187,
+        14.049_443_530_985_525,
+        -3.161_249_825_195_937_7,
     ];
-    let turn = x - round(x);
-    let square = turn * turn;
-    polynomial(square, &terms) * ((V::constant(0.25) - square) * turn)
+    let square = x * x;
+    polynomial(square, &terms) * ((V::constant(0.25) - square) * x)
 }
 
 /// Sine and cosine of angles up to pi / 4 in absolute value: Taylor polynomials whose first omitted term is below
@@ -118,7 +122,8 @@ fn arctangent<V: Lanes>(x: V) -> V {
 /// The sum of `terms[k] * x^k`.
 #[inline(always)]
 fn polynomial<V: Lanes>(x: V, terms: &[f64]) -> V {
-    terms.iter().rev().fold(V::constant(0.0), |sum, &term| sum.mul_add(x, V::constant(term)))
+    let (&last, others) = terms.split_last().unwrap_or((&0.0, &[]));
+    others.iter().rev().fold(V::constant(last), |sum, &term| sum.mul_add(x, V::constant(term)))
 }
 
 #[cfg(test)]
@@ -138,12 +143,22 @@ mod tests {
     }
 
     #[test]
-    fn sines_of_turns() {
-        for k in -3000..3000 {
-            let x = f64::from(k) / 700.0;
-            let exact = ((x - x.round()) * 2.0 * PI).sin();
-            assert!((sine_of_turns(x) - exact).abs() < 8e-13, "{x}");
-            assert!((f64::from(sine_of_turns(x as f32)) - exact).abs() < 2e-6, "{x}");
+    fn sines_of_parts_of_turns() {
+        for k in -1000..=1000 {
+            let x = f64::from(k) / 2000.0;
+            let exact = (x * 2.0 * PI).sin();
+            assert!((sine_of_part(x) - exact).abs() < 4e-9, "{x}");
+            assert!((f64::from(sine_of_part(x as f32)) - exact).abs() < 1e-6, "{x}");
+        }
+        assert_eq!([-0.5, 0.0, 0.5].map(sine_of_part), [0.0; 3]);
+    }
+
+    #[test]
+    fn steps_of_a_unit() {
+        for k in -5000..5000 {
+            let x = f64::from(k) * 0.000_37;
+            let exact = (x * 64.0).round_ties_even() / 64.0;
+            assert_eq!((to_steps(x, 64.0), f64::from(to_steps(x as f32, 64.0))), (exact, exact), "{x}");
         }
     }
 
@@ -180,16 +195,16 @@ mod tests {
     fn vectors_give_the_bits_of_scalars() {
         let numbers: [f64; 8] = std::array::from_fn(|k| (k as f64 - 3.7) * 1.3);
         let (x, y) = (f64x8::new(numbers), f64x8::new(numbers.map(|x| x * x - 5.0)));
-        let (sines, angles) = (sine_of_turns(x).to_array(), angle_of(y, x).to_array());
+        let (sines, angles) = (sine_of_part(x).to_array(), angle_of(y, x).to_array());
         for k in 0..8 {
             let (x, y) = (numbers[k], numbers[k] * numbers[k] - 5.0);
             assert_eq!(
                 (sines[k].to_bits(), angles[k].to_bits()),
-                (sine_of_turns(x).to_bits(), angle_of(y, x).to_bits())
+                (sine_of_part(x).to_bits(), angle_of(y, x).to_bits())
             );
         }
         let numbers: [f32; 16] = std::array::from_fn(|k| (k as f32 - 7.7) * 0.3);
-        let sines = sine_of_turns(f32x16::new(numbers)).to_array();
-        (0..16).for_each(|k| assert_eq!(sines[k].to_bits(), sine_of_turns(numbers[k]).to_bits()));
+        let sines = sine_of_part(f32x16::new(numbers)).to_array();
+        (0..16).for_each(|k| assert_eq!(sines[k].to_bits(), sine_of_part(numbers[k]).to_bits()));
     }
 }
