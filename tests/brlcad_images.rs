@@ -5,8 +5,9 @@ use std::path::Path;
 use lanecast::camera::Camera;
 use lanecast::film::pix;
 use lanecast::render::{RenderOptions, Silent, render};
+use lanecast::scene::brlcad;
 use lanecast::scene::brlcad::describe::{Options, describe};
-use lanecast::scene::brlcad::{self, view};
+use lanecast::scene::brlcad::view::{self, View};
 use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::world::{Preset, World};
 use lanecast::shade::Integrator;
@@ -110,6 +111,41 @@ fn middle<S: Engines>(text: &str, eye: &str, turn: &str) -> ([u8; 3], usize) {
     let pixels: Vec<[u8; 3]> = bytes.chunks_exact(3).map(|pixel| pixel.try_into().unwrap()).collect();
     let middle = pixels[20 * 40 + 20];
     (middle, pixels.iter().filter(|pixel| **pixel != middle).count())
+}
+
+/// What surrounds a thing is the same whether its tiles are shaded with their rays or without.
+fn surroundings_are_seen_without_rays<S: Engines>() {
+    let ball = "title {t}\nunits mm\nput b ell V {0 0 0} A {1 0 0} B {0 1 0} C {0 0 1}\n";
+    let region = "put r comb region yes tree {l b}\n";
+    let sky = "put s comb region yes shader {envmap cloud} tree {l b}\nput all comb region no tree {u {l r} {l s}}\n";
+    for (text, surrounded) in [(format!("{ball}{region}"), false), (format!("{ball}{region}{sky}"), true)] {
+        let file = Path::new("d.asc");
+        let database = brlcad::parse(file, text.as_bytes()).unwrap();
+        let description = describe(file, "d", &database, &Options::default()).unwrap();
+        assert_eq!(description.looks.as_ref().unwrap().surroundings.is_some(), surrounded);
+        let world = World::<S>::compile(&description, Preset::Balanced).unwrap();
+        for perspective in [None, Some(40f64.to_radians())] {
+            let script = b"viewsize 9;\norientation 0.1 0.1 0.7 0.7;\neye_pt 5 1 20;\nstart 0;\nend;\n";
+            let view = View { perspective, ..view::parse(Path::new("d.rt"), script).unwrap() };
+            let camera = Camera::of_view(&view, 1.0).unwrap();
+            let pictures = [false, true].map(|count| {
+                let (width, height, integrator) = (150, 150, Integrator::Rt);
+                let options = RenderOptions { width, height, integrator, count, ..Default::default() };
+                let output = render(&world, &description, &camera, &options, &Silent).unwrap();
+                (pix::to_bytes(&output.film, 0.0).unwrap(), output.rays)
+            });
+            assert!(pictures[0] == pictures[1], "{text} {perspective:?}");
+            let corner = pictures[0].0.first_chunk::<3>().unwrap();
+            assert_eq!(*corner == [0, 0, 1], !surrounded);
+            assert!(pictures[0].0.chunks_exact(3).filter(|pixel| pixel[0] > 20).count() > 200);
+        }
+    }
+}
+
+#[test]
+fn surroundings_are_seen_without_rays_in_either_precision() {
+    surroundings_are_seen_without_rays::<f32>();
+    surroundings_are_seen_without_rays::<f64>();
 }
 
 /// The inside of a region without bounds, by its definition: 0.18 where a ray never leaves it, and 0.8^6 of that where it

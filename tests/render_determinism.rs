@@ -7,7 +7,9 @@ use lanecast::camera::{Camera, framing};
 use lanecast::film::{PlaneData, Window, pix};
 use lanecast::render::progressive::Progressive;
 use lanecast::render::{Aov, Progress, RenderOptions, RenderOutput, Silent, render};
-use lanecast::scene::description::{Description, Item, ItemKind, Light, Material, Shape};
+use lanecast::scene::description::{
+    CameraDescription, Description, Item, ItemKind, Light, Material, Projection, Shape,
+};
 use lanecast::scene::world::{Preset, World};
 use lanecast::shade::Integrator;
 use lanecast::trace::Engines;
@@ -79,6 +81,39 @@ fn threads_and_tiles_change_nothing_in_f32() {
 #[test]
 fn threads_and_tiles_change_nothing_in_f64() {
     threads_and_tiles_change_nothing::<f64>();
+}
+
+/// Tiles in which no ray can meet anything are shaded without their rays, but not where the work is counted.
+fn tiles_without_anything_are_as_others<S: Engines>() {
+    let mut d = scene();
+    // Without the plane there is nothing around the spheres.
+    d.groups[0].items.remove(0);
+    let world = World::<S>::compile(&d, Preset::Balanced).unwrap();
+    let framed = framing(world.bounds(), 1.5);
+    let wide = Projection::Parallel { height: 12.0 };
+    let parallel = CameraDescription { projection: wide, ..framed.clone() };
+    for (description, width) in [(&framed, 240), (&parallel, 240), (&parallel, 223)] {
+        let camera = Camera::new(description, 1.5).unwrap();
+        for integrator in [Integrator::Whitted, Integrator::Ao, Integrator::Normals, Integrator::Depth] {
+            for aovs in [Vec::new(), vec![Aov::Z, Aov::Primitive, Aov::Cryptomatte]] {
+                let (spp, height) = (if width == 240 { 1 } else { 2 }, width * 2 / 3);
+                let options = RenderOptions { width, height, spp, integrator, aovs, ..options() };
+                let [quick, counted] = [false, true].map(|count| {
+                    render(&world, &d, &camera, &RenderOptions { count, ..options.clone() }, &Silent).unwrap()
+                });
+                assert!(bits(&quick) == bits(&counted), "{integrator:?}, {width}");
+                assert_eq!((quick.rays, counted.rays.primary), (counted.rays, u64::from(width * height * spp)));
+                let of_tile = |x0: u32| (0..32).any(|dx| quick.film.f32_plane("A").unwrap()[(x0 + dx) as usize] > 0.0);
+                assert!(integrator == Integrator::Whitted || !of_tile(0), "the first tile is empty");
+            }
+        }
+    }
+}
+
+#[test]
+fn tiles_without_anything_are_as_others_in_either_precision() {
+    tiles_without_anything_are_as_others::<f32>();
+    tiles_without_anything_are_as_others::<f64>();
 }
 
 /// What a `.pix` file gets is the same whether the film holds levels or floats.

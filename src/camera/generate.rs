@@ -16,6 +16,9 @@ use crate::ray::pencil::{Pencil, Places};
 /// Name of the sub-pixel offsets among the random dimensions of a pixel.
 const DIMENSION: u32 = 0;
 
+/// Tiles and samples reach less than so many times half the picture from its middle.
+const PLACES: f64 = 1e3;
+
 /// Pixels that are looked at together.
 const BLOCK: usize = 16;
 
@@ -43,6 +46,11 @@ pub enum SubPixel {
 }
 
 impl SubPixel {
+    /// Whether it is sure to lie in its pixel.
+    pub fn is_in_pixel(&self) -> bool {
+        !matches!(self, Self::Filtered { .. })
+    }
+
     #[inline]
     pub(super) fn offset(self, anchor: [f64; 2], x: u32, y: u32) -> [f64; 2] {
         self.offsets(anchor, &[[x], [y]]).map(|[offset]| offset)
@@ -84,7 +92,7 @@ pub fn fill_tile<S: Real>(
     fill_passes(camera, tiling, tile, rect, &[sub_pixel], rays);
 }
 
-/// The same with a ray of each pixel for each of `sub_pixels`, in the order of [`Passes`].
+/// The same with a ray of each pixel for each of `sub_pixels`, in the order of [`Passes`]. Returns how many are live.
 pub fn fill_passes<S: Real>(
     camera: &Camera,
     tiling: &Tiling,
@@ -92,21 +100,30 @@ pub fn fill_passes<S: Real>(
     rect: PixelRect,
     sub_pixels: &[SubPixel],
     rays: &mut Rays<S>,
-) {
+) -> u64 {
     let mut pencil = Pencil::default();
     if aim_passes(camera, tiling, tile, rect, sub_pixels, &mut pencil) {
-        return pencil.fill(rays);
+        pencil.fill(rays);
+    } else {
+        let count = pencil.len();
+        rays.prepare(count);
+        for axis in 0..3 {
+            let [eye, u, v] = [camera.eye, camera.u, camera.v].map(|of| f64x8::splat(of[axis]));
+            pencil.places.combine(&mut rays.org[axis][..count], |a| a * u, |b| b * v, |au, bv| eye + (au + bv));
+            rays.dir[axis][..count].fill(S::from_f64(-camera.n[axis]));
+        }
+        rays.t_min[..count].fill(S::ZERO);
+        rays.t_max[..count].fill(S::INFINITY);
+        pencil.kill(rays);
     }
-    let count = pencil.len();
-    rays.prepare(count);
-    for axis in 0..3 {
-        let [eye, u, v] = [camera.eye, camera.u, camera.v].map(|of| f64x8::splat(of[axis]));
-        pencil.places.combine(&mut rays.org[axis][..count], |a| a * u, |b| b * v, |au, bv| eye + (au + bv));
-        rays.dir[axis][..count].fill(S::from_f64(-camera.n[axis]));
-    }
-    rays.t_min[..count].fill(S::ZERO);
-    rays.t_max[..count].fill(S::INFINITY);
-    pencil.kill(rays);
+    // Only numbers that are not finite make others dead: nobody need read the rays to count them.
+    if is_within::<S>(camera) { pencil.live_count() } else { rays.live_count() as u64 }
+}
+
+/// Whether the numbers of all rays are finite in `S`.
+fn is_within<S: Real>(camera: &Camera) -> bool {
+    let largest = camera.eye.abs().max_element() + PLACES * (camera.half_width + camera.half_height) + 1.0;
+    largest < S::MAX.to_f64()
 }
 
 /// Where the rays of [`fill_tile`] go. False for a parallel camera, whose rays have no point in common: places are then

@@ -3,6 +3,7 @@
 mod filter;
 mod framing;
 mod generate;
+mod lines;
 mod matrices;
 mod model;
 mod passes;
@@ -14,6 +15,7 @@ mod tiles;
 pub use filter::Filter;
 pub use framing::framing;
 pub use generate::{SubPixel, aim_tile, fill_passes, fill_tile};
+pub use lines::{Range, range_of_tile};
 pub use model::{Camera, CameraOverrides};
 pub use passes::{Passes, Run};
 pub use scattered::fill_pixels;

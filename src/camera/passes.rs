@@ -42,6 +42,13 @@ impl Passes {
         (self.rays_per_tile * self.count) as usize
     }
 
+    /// Pass and pixel of ray `ray`, as [`Self::runs`] lists them.
+    pub fn of_ray(self, ray: usize) -> (u32, usize) {
+        let len = RUN.min(self.rays_per_tile) as usize;
+        let (group, place) = (ray / (len * self.count as usize), ray % (len * self.count as usize));
+        ((place / len) as u32, group * len + place % len)
+    }
+
     /// The rays in their order; those of a pixel come in the order of the passes.
     pub fn runs(self) -> impl Iterator<Item = Run> {
         let len = RUN.min(self.rays_per_tile) as usize;
@@ -68,6 +75,7 @@ mod tests {
             for run in passes.runs() {
                 assert_eq!((run.rays.start, run.rays.len()), (next, run.pixels.len()));
                 next = run.rays.end;
+                run.rays.zip(run.pixels.clone()).for_each(|(ray, at)| assert_eq!(passes.of_ray(ray), (run.pass, at)));
                 run.pixels.for_each(|pixel| order[pixel].push(run.pass));
             }
             assert_eq!(next, passes.rays());

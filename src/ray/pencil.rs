@@ -102,6 +102,11 @@ impl Pencil {
         self.live.is_empty()
     }
 
+    /// Number of live rays.
+    pub fn live_count(&self) -> u64 {
+        self.live.iter().map(|live| u64::from(live.count_ones())).sum()
+    }
+
     /// Makes `rays` these rays.
     pub fn fill<S: Real>(&self, rays: &mut Rays<S>) {
         let count = self.len();

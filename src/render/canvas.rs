@@ -4,10 +4,12 @@ use std::ops::Range;
 
 use super::options::RenderOptions;
 use super::patch::{Layout, Patch};
-use crate::camera::{Camera, Passes, PixelRect, Tiling, fill_passes, fill_pixels, morton_decode};
+use crate::camera::{
+    Camera, Passes, PixelRect, SubPixel, Tiling, fill_passes, fill_pixels, morton_decode, range_of_tile,
+};
 use crate::lanes::Real;
 use crate::ray::Rays;
-use crate::shade::{Samples, Shader, Spot, Workspace};
+use crate::shade::{Samples, Shader, Spots, Workspace};
 
 /// What is seen, and how it is cut into tiles.
 pub(super) struct Canvas<'a> {
@@ -27,7 +29,6 @@ pub(super) struct Memory<S> {
     pub samples: Samples,
     pub patch: Patch,
     rays: Rays<S>,
-    spots: Vec<Spot>,
 }
 
 impl<S: Real> Default for Memory<S> {
@@ -38,7 +39,6 @@ impl<S: Real> Default for Memory<S> {
             samples: Samples::default(),
             patch: Patch::default(),
             rays: Rays::new(0),
-            spots: Vec::new(),
         }
     }
 }
@@ -57,7 +57,7 @@ impl Canvas<'_> {
         Layout::Square(self.tiling.origin(tile), self.tiling.edge())
     }
 
-    /// Traces the samples `numbers` of the pixels of a tile, which `memory` lists, as one batch into `memory.samples`.
+    /// Traces the samples `numbers` of the pixels of a tile as one batch into `memory.samples`.
     pub fn shade<S: Real>(
         &self,
         shader: &Shader<'_, S>,
@@ -67,24 +67,32 @@ impl Canvas<'_> {
     ) -> Passes {
         let sub_pixels: Vec<_> = numbers.clone().map(|sample| self.options.sub_pixel(sample)).collect();
         let passes = Passes::new(&self.tiling, sub_pixels.len() as u32);
-        let Memory { rays, spots, pixels, samples, work, .. } = memory;
-        fill_passes(self.camera, &self.tiling, tile, self.rect, &sub_pixels, rays);
-        spots.clear();
-        for run in passes.runs() {
-            let sample = numbers.start + run.pass;
-            spots.extend(pixels[run.pixels].iter().map(|&(x, y)| Spot { x, y, sample }));
+        let Memory { rays, samples, work, .. } = memory;
+        if self.is_whole(tile) && sub_pixels.iter().all(SubPixel::is_in_pixel) {
+            let range = range_of_tile(self.camera, &self.tiling, tile);
+            if shader.shade_void(&range, passes.rays() as u64, work, samples) {
+                return passes;
+            }
         }
-        shader.shade(rays, spots, work, samples);
+        let live = fill_passes(self.camera, &self.tiling, tile, self.rect, &sub_pixels, rays);
+        let spots = Spots::Tile { corner: self.tiling.origin(tile), passes, first: numbers.start };
+        shader.shade(rays, live, spots, work, samples);
         passes
+    }
+
+    /// Whether all pixels of a tile are wanted.
+    fn is_whole(&self, tile: u32) -> bool {
+        let ((x, y), last) = (self.tiling.origin(tile), self.tiling.edge() - 1);
+        let is_there = x + last < self.tiling.width() && y + last < self.tiling.height();
+        is_there && self.rect.contains(x, y) && self.rect.contains(x + last, y + last)
     }
 
     /// Traces the first sample of each of the pixels of `memory`.
     pub fn shade_pixels<S: Real>(&self, shader: &Shader<'_, S>, memory: &mut Memory<S>) {
-        let Memory { rays, spots, pixels, samples, work, .. } = memory;
+        let Memory { rays, pixels, samples, work, .. } = memory;
         let size = (self.tiling.width(), self.tiling.height());
         fill_pixels(self.camera, size, pixels, self.options.sub_pixel(0), rays);
-        spots.clear();
-        spots.extend(pixels.iter().map(|&(x, y)| Spot { x, y, sample: 0 }));
-        shader.shade(rays, spots, work, samples);
+        let live = rays.live_count() as u64;
+        shader.shade(rays, live, Spots::Listed(pixels), work, samples);
     }
 }

@@ -6,13 +6,17 @@ use super::aov::{Aov, COLOR, Channel, Get, LEVELS};
 use super::options::RenderOptions;
 use super::pixels::Pixel;
 use super::sums::Finished;
-use crate::camera::morton_encode;
+use crate::camera::{morton_decode, morton_encode};
 use crate::film::pix::{level, levels};
 use crate::film::{Film, Plane, PlaneData, Window};
 use crate::lanes::ask_for_large_pages;
 
-/// Pixels whose colours become planes together.
-const ROW: usize = 32;
+/// Pixels of a block of 4 x 4.
+const BLOCK: usize = 16;
+/// Numbers of the pairs of pixels that make up its rows, in Morton order.
+const BLOCK_ROWS: [[usize; 2]; 4] = [[0, 2], [1, 3], [4, 6], [5, 7]];
+/// Pixels of the rows of most tiles.
+const TILE: usize = 32;
 
 /// The planes of a picture: its colours, and those of its AOVs.
 pub(super) struct Channels {
@@ -72,40 +76,60 @@ pub(super) fn empty_film(size: (u32, u32), window: Window, channels: &Channels) 
 pub(super) enum Layout<'a> {
     /// These.
     Listed(&'a [(u32, u32)]),
-    /// Those of a square in Morton order: its upper left pixel and its edge.
+    /// Those of a square in Morton order: its upper left pixel and its edge, a multiple of 4.
     Square((u32, u32), u32),
 }
 
 /// What the planes get from a batch of pixels: worked out before the film is locked, which is then a matter of copying.
 #[derive(Default)]
 pub(super) struct Patch {
-    /// Places in the planes, one after the other as far as they are neighbours.
-    runs: Vec<Range<usize>>,
-    /// Numbers of the pixels that have one.
-    kept: Vec<u32>,
-    /// Those pixels, if there are planes besides colours.
+    /// Numbers of first values, and the places in the planes where they and those behind them go.
+    runs: Vec<(usize, Range<usize>)>,
+    /// Numbers of pixels in the order of their values, if there are planes besides colours.
+    order: Vec<u32>,
+    /// Those pixels.
     pixels: Vec<Pixel>,
-    /// Numbers of the pixels of a square's first row.
-    columns: Vec<u32>,
-    /// By channel: the value of each place.
+    /// By channel: the value of each pixel, of squares row by row.
     values: Vec<PlaneData>,
+    /// By channel: the colour of each pixel, rounded.
+    colors: [Vec<f32>; 4],
+    /// One channel, row by row.
+    rows: Vec<f32>,
+    square: Square,
 }
 
 impl Patch {
-    /// Takes the planes' values of those pixels of `layout` that lie in `window` from `finished`, parallel to them, and forgets
-    /// earlier ones; `channels` are the same each time.
+    /// Takes the planes' values of the pixels of `layout` from `finished`, parallel to them, and forgets earlier ones; those in
+    /// `window` are painted. `channels` are the same each time.
     pub fn fill(&mut self, channels: &Channels, window: Window, layout: Layout<'_>, finished: Finished<'_>) {
         self.lay_out(window, layout);
         if self.values.is_empty() {
             self.values.extend(channels.data(|_| Vec::new(), |_| Vec::new(), |_| Vec::new()));
         }
         let (colors, further) = self.values.split_at_mut(channels.colors);
-        take_colors(channels.gain, &self.kept, finished, colors);
+        let (count, square) = match layout {
+            Layout::Listed(pixels) => (pixels.len(), None),
+            Layout::Square(_, edge) => {
+                self.square.resize(edge as usize);
+                ((edge * edge) as usize, Some(&self.square))
+            }
+        };
+        let of_colors = &mut self.colors[..channels.colors];
+        of_colors.iter_mut().for_each(|channel| channel.resize(count, 0.0));
+        finished.colors(of_colors);
+        take_colors(channels.gain, of_colors, square, colors, &mut self.rows);
         if further.is_empty() {
             return;
         }
+        self.order.clear();
+        match layout {
+            Layout::Listed(pixels) => self.order.extend(0..pixels.len() as u32),
+            Layout::Square(_, edge) => {
+                self.order.extend((0..edge * edge).map(|place| morton_encode(place % edge, place / edge)));
+            }
+        }
         self.pixels.clear();
-        self.pixels.extend(self.kept.iter().map(|&number| finished.pixel(number as usize)));
+        self.pixels.extend(self.order.iter().map(|&number| finished.pixel(number as usize)));
         for (channel, values) in channels.list[channels.colors..].iter().zip(further) {
             match (channel.get, values) {
                 (Get::F32(get), PlaneData::F32(values)) => {
@@ -121,28 +145,21 @@ impl Patch {
         }
     }
 
-    /// Places and numbers of the pixels of `layout` in `window`, neighbours together.
+    /// Where the values of those pixels of `layout` go that lie in `window`, neighbours together.
     fn lay_out(&mut self, window: Window, layout: Layout<'_>) {
         self.runs.clear();
-        self.kept.clear();
         match layout {
             Layout::Listed(pixels) => {
                 for (number, &(x, y)) in pixels.iter().enumerate() {
-                    if let Some(place) = window.index(x, y) {
-                        self.kept.push(number as u32);
-                        self.runs.push(place..place + 1);
-                    }
+                    self.runs.extend(window.index(x, y).map(|place| (number, place..place + 1)));
                 }
             }
             Layout::Square((left, top), edge) => {
                 let columns = left.max(window.x0)..(left + edge).min(window.x1);
-                self.columns.clear();
-                self.columns.extend(columns.clone().map(|x| morton_encode(x - left, 0)));
                 for y in top.max(window.y0)..(top + edge).min(window.y1) {
                     let Some(place) = window.index(columns.start, y) else { continue };
-                    let row = morton_encode(0, y - top);
-                    self.kept.extend(self.columns.iter().map(|column| column | row));
-                    self.runs.push(place..place + columns.len());
+                    let number = (y - top) * edge + (columns.start - left);
+                    self.runs.push((number as usize, place..place + columns.len()));
                 }
             }
         }
@@ -150,7 +167,7 @@ impl Patch {
 
     /// Places in the planes that it covers.
     pub fn places(&self) -> impl Iterator<Item = usize> {
-        self.runs.iter().cloned().flatten()
+        self.runs.iter().flat_map(|(_, places)| places.clone())
     }
 
     /// Copies the values to `film`, which has the planes of the channels and the window that they were taken for.
@@ -166,41 +183,62 @@ impl Patch {
     }
 }
 
-/// Makes `planes` the colours of the pixels `kept` of `finished`, as floats or as levels of `gain` times as much.
-fn take_colors(gain: f64, kept: &[u32], finished: Finished<'_>, planes: &mut [PlaneData]) {
-    for plane in &mut *planes {
+/// Makes `planes` the `colors` of pixels, as floats or as levels of `gain` times as much; of a square if it has an edge.
+fn take_colors(gain: f64, colors: &[Vec<f32>], square: Option<&Square>, planes: &mut [PlaneData], rows: &mut Vec<f32>) {
+    for (colors, plane) in colors.iter().zip(planes) {
         match plane {
-            PlaneData::F32(values) => values.clear(),
-            PlaneData::U32(values) => values.clear(),
-            PlaneData::U8(values) => values.clear(),
-        }
-    }
-    let mut rows = [[0.0; ROW]; 4];
-    for numbers in kept.chunks(ROW) {
-        finished.colors(numbers, &mut rows);
-        for (row, plane) in rows.iter().zip(&mut *planes) {
-            match plane {
-                PlaneData::F32(values) => values.extend_from_slice(&row[..numbers.len()]),
-                PlaneData::U8(values) => {
-                    let mut of_row = [0; ROW];
-                    levels(row, gain, &mut of_row);
-                    values.extend_from_slice(&of_row[..numbers.len()]);
-                }
-                PlaneData::U32(_) => unreachable!("colours are no numbers"),
+            PlaneData::F32(values) => in_rows(colors, square, values),
+            PlaneData::U8(values) => {
+                in_rows(colors, square, rows);
+                values.resize(rows.len(), 0);
+                levels(rows, gain, values);
             }
+            PlaneData::U32(_) => unreachable!("colours are no numbers"),
         }
     }
 }
 
-fn copy<T: Copy>(runs: &[Range<usize>], values: &[T], data: &mut [T]) {
-    let mut rest = values;
-    for run in runs {
-        let (values, others) = rest.split_at(run.len());
-        rest = others;
-        match values {
-            // Blocks of pixels are far from each other: no call for each.
-            [value] => data[run.start] = *value,
-            _ => data[run.clone()].copy_from_slice(values),
+/// Writes the values of pixels where they belong: in a square row by row.
+fn in_rows(values: &[f32], square: Option<&Square>, to: &mut Vec<f32>) {
+    to.resize(values.len(), 0.0);
+    let Some(Square { edge, blocks }) = square else { return to.copy_from_slice(values) };
+    for (values, &first) in values.as_chunks::<BLOCK>().0.iter().zip(blocks) {
+        let pairs = values.as_chunks::<2>().0;
+        for (row, [left, right]) in BLOCK_ROWS.iter().enumerate() {
+            let to = &mut to[first + row * edge..][..4];
+            to[..2].copy_from_slice(&pairs[*left]);
+            to[2..].copy_from_slice(&pairs[*right]);
+        }
+    }
+}
+
+/// Where the blocks of a square begin, in rows of pixels.
+#[derive(Default)]
+struct Square {
+    edge: usize,
+    blocks: Vec<usize>,
+}
+
+impl Square {
+    /// Makes it one of `edge` pixels on a side.
+    fn resize(&mut self, edge: usize) {
+        if self.edge != edge {
+            let place = |(x, y): (u32, u32)| y as usize * edge + x as usize;
+            self.edge = edge;
+            self.blocks.clear();
+            self.blocks.extend((0..edge * edge).step_by(BLOCK).map(|pixel| place(morton_decode(pixel as u32))));
+        }
+    }
+}
+
+fn copy<T: Copy>(runs: &[(usize, Range<usize>)], values: &[T], data: &mut [T]) {
+    for (first, places) in runs {
+        let values = &values[*first..][..places.len()];
+        match (values, values.first_chunk::<TILE>()) {
+            // Blocks of pixels are far from each other, rows of tiles short: no call for each.
+            ([value], _) => data[places.start] = *value,
+            (_, Some(row)) if values.len() == TILE => data[places.clone()].copy_from_slice(row),
+            _ => data[places.clone()].copy_from_slice(values),
         }
     }
 }
@@ -210,7 +248,6 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::camera::morton_decode;
     use crate::shade::{FirstHit, Rgba, Samples};
 
     #[test]
@@ -220,7 +257,7 @@ mod tests {
         let mut film = empty_film((10, 10), window, &channels);
         let color = Rgba { radiance: DVec3::new(1.0, 2.0, 3.0), alpha: 1.0 };
         let hit = FirstHit { distance: 4.0, prim: 9, ..FirstHit::NONE };
-        let samples = |count| Samples { colors: vec![color; count], hits: vec![hit; count] };
+        let samples = |count| Samples { colors: std::iter::repeat_n(color, count).collect(), hits: vec![hit; count] };
         let mut patch = Patch::default();
         patch.fill(&channels, window, Layout::Listed(&[(4, 2)]), Finished::Samples(&samples(1)));
         let pixels = [(5, 3), (7, 3), (5, 4)];
@@ -250,11 +287,12 @@ mod tests {
             patch.paint(&mut film);
             (patch.runs, film.planes[0].data.clone())
         };
-        let (runs, red) = paint((0, 0), 2);
-        assert_eq!((runs, red), (vec![0..1, 3..4], PlaneData::F32(vec![1.0, 0.0, 0.0, 11.0, 0.0, 0.0, 0.0, 0.0, 0.0])));
-        let (runs, red) = paint((2, 1), 4);
+        let (runs, red) = paint((0, 0), 4);
+        assert_eq!(runs, [(1, 0..3), (5, 3..6), (9, 6..9)]);
+        assert_eq!(red, PlaneData::F32(vec![1.0, 2.0, 3.0, 11.0, 12.0, 13.0, 21.0, 22.0, 23.0]));
+        let (runs, red) = paint((2, 1), 8);
         let expected = vec![0.0, 0.0, 0.0, 0.0, 12.0, 13.0, 0.0, 22.0, 23.0];
-        assert_eq!((runs, red), (vec![4..6, 7..9], PlaneData::F32(expected)));
+        assert_eq!((runs, red), (vec![(0, 4..6), (8, 7..9)], PlaneData::F32(expected)));
         assert!(paint((4, 0), 8).0.is_empty() && paint((0, 8), 8).0.is_empty());
     }
 }

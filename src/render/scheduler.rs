@@ -97,6 +97,7 @@ pub fn render_with<S: Real>(
         let mut film = locked(&film);
         memory.patch.paint(&mut film);
         if let Some(mattes) = &job.mattes {
+            job.canvas.list_pixels(tile.number, memory);
             mattes.paint(&mut film, window, &memory.pixels, &tile.coverages, tile.count);
         }
         drop(film);
@@ -176,9 +177,9 @@ impl<S: Real> Job<'_, S> {
 
     /// Adds samples to `tile` until there are `spp` of each pixel; false if stopped before.
     fn samples(&self, tile: &mut Tile, spp: u32, memory: &mut Memory<S>) -> bool {
-        self.canvas.list_pixels(tile.number, memory);
+        let pixels = self.canvas.tiling.rays_per_tile() as usize;
         if !self.is_of_one_sample() {
-            tile.sums.make_room(memory.pixels.len());
+            tile.sums.make_room(pixels);
         }
         while tile.count < spp {
             if self.progress.stopped() {
@@ -187,7 +188,7 @@ impl<S: Real> Job<'_, S> {
             let numbers = tile.count..spp.min(tile.count + self.shader.passes(tile.count));
             let passes = self.canvas.shade(&self.shader, tile.number, numbers, memory);
             if let Some(mattes) = &self.mattes {
-                mattes.count(passes, memory.pixels.len(), &memory.samples.hits, &mut tile.coverages);
+                mattes.count(passes, pixels, &memory.samples.hits, &mut tile.coverages);
             }
             if !self.is_of_one_sample() {
                 tile.sums.add_passes(passes, &memory.samples);
@@ -233,7 +234,6 @@ impl<S: Real> Job<'_, S> {
             if tile.count == 0 {
                 return Tally::default();
             }
-            self.canvas.list_pixels(tile.number, memory);
             paint(tile, memory);
             Tally { done: 1, ..Tally::default() }
         };
@@ -241,7 +241,7 @@ impl<S: Real> Job<'_, S> {
         total.plus(painted.reduce(Tally::default, Tally::plus))
     }
 
-    /// Takes what the planes get from a finished tile, whose pixels `memory` lists.
+    /// Takes what the planes get from a finished tile.
     fn fill(&self, tile: &Tile, memory: &mut Memory<S>) {
         let finished = if self.is_of_one_sample() {
             Finished::Samples(&memory.samples)

@@ -45,7 +45,7 @@ impl Sums {
 
     /// Adds what ray `ray` saw to sum number `pixel`.
     pub fn add(&mut self, pixel: usize, samples: &Samples, ray: usize) {
-        add_color(&mut self.colors[pixel], &samples.colors[ray]);
+        add_color(&mut self.colors[pixel], &samples.colors.get(ray));
         if let Some(sum) = self.hits.get_mut(pixel) {
             add_hit(sum, &samples.hits[ray]);
         }
@@ -55,7 +55,7 @@ impl Sums {
     pub fn add_passes(&mut self, passes: Passes, samples: &Samples) {
         for run in passes.runs() {
             let sums = &mut self.colors[run.pixels.clone()];
-            sums.iter_mut().zip(&samples.colors[run.rays.clone()]).for_each(|(sum, color)| add_color(sum, color));
+            sums.iter_mut().zip(run.rays.clone()).for_each(|(sum, ray)| add_color(sum, &samples.colors.get(ray)));
             if self.with_hits {
                 let sums = &mut self.hits[run.pixels];
                 sums.iter_mut().zip(&samples.hits[run.rays]).for_each(|(sum, hit)| add_hit(sum, hit));
@@ -88,19 +88,23 @@ pub(super) enum Finished<'a> {
 }
 
 impl Finished<'_> {
-    /// Red, green, blue and coverage of the pixels `numbers`, rounded, into the first places of `rows`.
-    #[inline]
-    pub fn colors<const N: usize>(&self, numbers: &[u32], rows: &mut [[f32; N]; 4]) {
-        let mut put = |k: usize, Rgba { radiance: DVec3 { x, y, z }, alpha }: Rgba| {
-            // 0 + -0 is 0, as in a sum. Four numbers at once.
-            let four = f64x4::new([x, y, z, alpha]) + f64x4::ZERO;
-            let four = four.to_array().map(|value| value as f32);
-            (0..4).for_each(|channel| rows[channel][k] = four[channel]);
-        };
-        let places = (0..N).zip(numbers);
+    /// Red, green, blue and coverage of all pixels, rounded, into the first `to`, which are as long.
+    pub fn colors(&self, to: &mut [Vec<f32>]) {
         match self {
-            Self::Samples(samples) => places.for_each(|(k, &i)| put(k, samples.colors[i as usize])),
-            Self::Sums(sums, count) => places.for_each(|(k, &i)| put(k, mean(&sums.colors[i as usize], *count))),
+            Self::Samples(samples) => {
+                for (to, channel) in to.iter_mut().zip(samples.colors.channels()) {
+                    // 0 + -0 is 0, as in a sum.
+                    to.iter_mut().zip(channel).for_each(|(to, &value)| *to = (0.0 + value) as f32);
+                }
+            }
+            Self::Sums(sums, count) => {
+                for (i, sum) in sums.colors.iter().enumerate() {
+                    let Rgba { radiance: DVec3 { x, y, z }, alpha } = mean(sum, *count);
+                    // Four numbers at once.
+                    let four = f64x4::new([x, y, z, alpha]) + f64x4::ZERO;
+                    to.iter_mut().zip(four.to_array()).for_each(|(to, value)| to[i] = value as f32);
+                }
+            }
         }
     }
 
@@ -133,7 +137,7 @@ impl Finished<'_> {
         match self {
             Self::Samples(samples) => {
                 let mut sum = Color::default();
-                add_color(&mut sum, &samples.colors[i]);
+                add_color(&mut sum, &samples.colors.get(i));
                 (sum, 1)
             }
             Self::Sums(sums, count) => (sums.colors[i], *count),
@@ -192,7 +196,7 @@ mod tests {
         let far = FirstHit { distance: 9.0, inst: 1, prim: 2, ..FirstHit::NONE };
         let near = FirstHit { distance: 3.0, prim: 5, nodes: 8.0, ..far };
         let twin = FirstHit { prim: 6, ..near };
-        let colors = vec![red, Rgba::default(), red, red];
+        let colors = [red, Rgba::default(), red, red].into_iter().collect();
         let samples = Samples { colors, hits: vec![far, FirstHit::NONE, near, twin] };
         let mut sums = Sums::new(true);
         sums.make_room(1);
@@ -205,14 +209,19 @@ mod tests {
         let mut sums_of_one = Sums::new(true);
         sums_of_one.make_room(2);
         let turned = FirstHit { normal: -DVec3::Z, ..near };
-        let two = Samples { colors: vec![red, Rgba::default()], hits: vec![turned, FirstHit::NONE] };
+        let two = Samples { colors: [red, Rgba::default()].into_iter().collect(), hits: vec![turned, FirstHit::NONE] };
         (0..2).for_each(|ray| sums_of_one.add(ray, &two, ray));
         for ray in 0..2 {
             let (same, pixel) = (Finished::Samples(&two).pixel(ray), Finished::Sums(&sums_of_one, 1).pixel(ray));
-            let mut color = [[0.0]; 4];
-            Finished::Samples(&two).colors(&[ray as u32], &mut color);
+            let colors = [Finished::Samples(&two), Finished::Sums(&sums_of_one, 1)].map(|finished| {
+                let mut all = [const { Vec::new() }; 4];
+                all.iter_mut().for_each(|channel| channel.resize(2, 0.0));
+                finished.colors(&mut all);
+                all.map(|channel| channel[ray])
+            });
             let Rgba { radiance: DVec3 { x, y, z }, alpha } = same.color;
-            assert_eq!((same, color), (pixel, [x, y, z, alpha].map(|value| [value as f32])));
+            let color = [x, y, z, alpha].map(|value| value as f32);
+            assert_eq!((same, colors), (pixel, [color; 2]));
             assert_eq!(same.hit.normal.x.to_bits(), 0);
         }
         assert!((sums.error(4) - (1.0_f64 / 144.0).sqrt() / 0.25).abs() < 1e-12);
@@ -221,12 +230,13 @@ mod tests {
     #[test]
     fn passes_add_up_pixel_by_pixel() {
         let passes = Passes::new(&Tiling::new(64, 64, 32).unwrap(), 3);
-        let mut samples = Samples { colors: vec![Rgba::default(); passes.rays()], hits: Vec::new() };
+        let mut colors = vec![Rgba::default(); passes.rays()];
         for run in passes.runs() {
             for (ray, pixel) in run.rays.zip(run.pixels) {
-                samples.colors[ray].radiance = DVec3::new(pixel as f64, f64::from(run.pass), 0.0);
+                colors[ray].radiance = DVec3::new(pixel as f64, f64::from(run.pass), 0.0);
             }
         }
+        let samples = Samples { colors: colors.into_iter().collect(), hits: Vec::new() };
         let mut sums = Sums::new(false);
         sums.make_room(1024);
         sums.add_passes(passes, &samples);

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use crate::lanes::chosen::Chosen;
+use super::colors::Colors;
+use crate::lanes::chosen::{Chosen, at, lanes_of, spill};
 use crate::lanes::{Column, Lanes, Lanes3, MAX_LANES, Real, each};
 use crate::ray::Rays;
 
@@ -60,6 +61,18 @@ impl<S: Real> Branches<S> {
     #[inline(always)]
     pub fn weighed(&self, first: usize, color: Lanes3<S::Wide>) -> Lanes3<S::Wide> {
         if self.is_whole { color } else { each(|axis| S::Wide::load(&self.weight[axis][first..]) * color[axis]) }
+    }
+
+    /// Adds `light` of rays `first + lane` of `lanes` to their samples in `out`.
+    #[inline(always)]
+    pub fn shine(&self, first: usize, lanes: u32, light: Lanes3<S::Wide>, out: &mut Colors) {
+        if self.is_whole {
+            return out.add_lanes(first, lanes, light);
+        }
+        let light = spill(light);
+        for lane in lanes_of(lanes) {
+            out.add(self.path[first + lane] as usize, DVec3::from(at(&light, lane).map(S::to_f64)));
+        }
     }
 
     /// What ray `i` carries, which has a weight of its own.

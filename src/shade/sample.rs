@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::colors::Colors;
 use crate::ray::INVALID_ID;
 
 /// The colour that one primary ray saw; nothing by default.
@@ -59,7 +60,7 @@ impl FirstHit {
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
     /// Colours.
-    pub colors: Vec<Rgba>,
+    pub colors: Colors,
     /// What else; empty if nothing else was wanted.
     pub hits: Vec<FirstHit>,
 }
@@ -67,8 +68,17 @@ pub struct Samples {
 impl Samples {
     /// Those of `count` rays that saw nothing yet, with or without first hits.
     pub(super) fn open(&mut self, count: usize, with_hits: bool) {
-        self.colors.clear();
-        self.colors.resize(count, Rgba::default());
+        self.colors.open(count);
+        self.open_hits(count, with_hits);
+    }
+
+    /// The same with colours that are unspecified, see [`Colors::prepare`].
+    pub(super) fn prepare(&mut self, count: usize, with_hits: bool) {
+        self.colors.prepare(count);
+        self.open_hits(count, with_hits);
+    }
+
+    fn open_hits(&mut self, count: usize, with_hits: bool) {
         self.hits.clear();
         self.hits.resize(if with_hits { count } else { 0 }, FirstHit::NONE);
     }
@@ -83,7 +93,7 @@ impl Samples {
     /// Adds light to what ray `i` sees, with or without detours.
     #[inline]
     pub(super) fn add(&mut self, i: usize, is_direct: bool, light: DVec3) {
-        self.colors[i].radiance += light;
+        self.colors.add(i, light);
         if is_direct && let Some(hit) = self.hits.get_mut(i) {
             hit.direct += light;
         }

@@ -13,7 +13,7 @@ use super::meeting::{Meeting, met_lanes};
 use super::path::{PathMemory, Paths};
 use super::rt::Rt;
 use super::sample::{FirstHit, RayCounts, Samples};
-use super::spot::{Draw, Spot};
+use super::spot::{Draw, Spot, Spots};
 use super::stats::{Clock, PathStats};
 use super::through::{Again, Through};
 use super::vertices::Vertices;
@@ -68,13 +68,13 @@ pub struct Workspace<S> {
     pub(super) clock: Clock,
     pub(super) scratch: Scratch,
     pub(super) hits: Hits<S>,
-    pub(super) whitted: whitted::Memory<S>,
-    pub(super) vertices: Vertices<S>,
+    pub(super) whitted: Option<Box<whitted::Memory<S>>>,
+    pub(super) vertices: Option<Box<Vertices<S>>>,
     pub(super) batch: Rays<S>,
     pub(super) occluded: Vec<u8>,
     again: Again<S>,
     pub(super) paths: PathMemory<S>,
-    pub(super) rt: super::rt::Memory<S>,
+    pub(super) rt: Option<Box<super::rt::Memory<S>>>,
     block: Rays<S>,
     block_hits: Hits<S>,
 }
@@ -88,13 +88,13 @@ impl<S: Real> Default for Workspace<S> {
             clock: Clock::default(),
             scratch: Scratch::default(),
             hits: Hits::new(0),
-            whitted: whitted::Memory::default(),
-            vertices: Vertices::default(),
+            whitted: None,
+            vertices: None,
             batch: Rays::new(0),
             occluded: Vec::new(),
             again: Again::default(),
             paths: PathMemory::default(),
-            rt: super::rt::Memory::default(),
+            rt: None,
             block: Rays::new(0),
             block_hits: Hits::new(0),
         }
@@ -126,7 +126,7 @@ pub struct Shader<'a, S: Real> {
     pub(super) meeting: Meeting<S>,
     /// What the sides of materials scatter with, as [`Looks::sides`] lists them.
     pub(super) sides: Vec<LookNumbers<S>>,
-    rt: Option<Rt>,
+    pub(super) rt: Option<Rt>,
     paths: Option<Paths<'a, S>>,
 }
 
@@ -185,17 +185,18 @@ impl<'a, S: Real> Shader<'a, S> {
         if self.paths.is_some() { done.clamp(1, PASSES) } else { 1 }
     }
 
-    /// What each ray of the primary batch `rays` sees, into `out` (made as long as the batch). Ray `i` is sample
-    /// `spots[i]`. Dead rays see nothing. What the batch is afterwards is unspecified.
-    pub fn shade(&self, rays: &mut Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut Samples) {
-        let shows_hits = self.settings.first_hits || self.settings.cost || self.settings.integrator.shows_hits();
-        out.open(rays.len(), shows_hits);
+    /// What each ray of the primary batch `rays`, of which `live` are, sees, into `out` (made as long as the batch). Ray `i` is sample
+    /// `spots.at(i)`. Dead rays see nothing. What the batch is afterwards is unspecified.
+    pub fn shade(&self, rays: &mut Rays<S>, live: u64, spots: Spots<'_>, work: &mut Workspace<S>, out: &mut Samples) {
+        let shows_hits = self.shows_hits();
         work.clock.start(&work.rays);
-        work.rays.primary += rays.live_count() as u64;
+        work.rays.primary += live;
         if let (Integrator::Rt, Some(rt)) = (self.settings.integrator, &self.rt) {
-            self.rt(rt, rays, work, out);
+            out.prepare(rays.len(), shows_hits);
+            self.rt(rt, rays, live, work, out);
             return work.lap(0);
         }
+        out.open(rays.len(), shows_hits);
         if let Some(paths) = &self.paths {
             return paths.shade(rays, spots, work, out);
         }
@@ -204,13 +205,13 @@ impl<'a, S: Real> Shader<'a, S> {
             self.trace_blocks(rays, work, &mut out.hits);
             work.clock.tracing += clock.elapsed();
         } else {
-            self.intersect(rays, work, |i, layer| self.draw(spots[i]).number(0, layer));
+            self.intersect(rays, work, |i, layer| self.draw(spots.at(i)).number(0, layer));
         }
-        let hit = |first: usize| lanes_of(met_lanes(&work.hits, first)).map(move |lane| first + lane);
-        for i in (0..rays.padded_len()).step_by(S::Wide::N).flat_map(hit) {
-            out.colors[i].alpha = 1.0;
-            if let Some(seen) = out.hits.get_mut(i) {
-                self.show(rays, &work.hits, i, seen);
+        for first in (0..rays.padded_len()).step_by(S::Wide::N) {
+            let hit = met_lanes(&work.hits, first);
+            out.colors.make_lanes_opaque::<S::Wide>(first, hit);
+            if shows_hits {
+                lanes_of(hit).for_each(|lane| self.show(rays, &work.hits, first + lane, &mut out.hits[first + lane]));
             }
         }
         match self.settings.integrator {
@@ -226,6 +227,11 @@ impl<'a, S: Real> Shader<'a, S> {
                 work.lap(0);
             }
         }
+    }
+
+    /// Whether samples list first hits.
+    pub(super) fn shows_hits(&self) -> bool {
+        self.settings.first_hits || self.settings.cost || self.settings.integrator.shows_hits()
     }
 
     /// Closest hits of `rays` into `work.hits`. Where surfaces let rays pass by chance, `number` decides for ray `i` at
@@ -268,6 +274,11 @@ impl<'a, S: Real> Shader<'a, S> {
     /// Radiance of a ray that leaves the scene along `dir`.
     pub(super) fn beyond(&self, dir: DVec3) -> DVec3 {
         self.environment.map_or(self.background, |environment| environment.radiance(dir))
+    }
+
+    /// The same if it is the same in all directions.
+    pub(super) fn even_beyond(&self) -> Option<DVec3> {
+        self.environment.is_none().then_some(self.background)
     }
 
     /// As [`Self::intersect`], 16 rays at a time with counting kernels, which gives each block of 4 x 4 pixels its

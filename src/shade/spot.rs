@@ -2,6 +2,7 @@
 
 use crate::camera::sampling::pcg4d;
 use crate::camera::sobol::PixelPoints;
+use crate::camera::{Passes, morton_decode};
 
 /// Which sample of which pixel a primary ray is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +13,36 @@ pub struct Spot {
     pub y: u32,
     /// Number of the sample.
     pub sample: u32,
+}
+
+/// Which samples the rays of a batch are.
+#[derive(Clone, Copy, Debug)]
+pub enum Spots<'a> {
+    /// Sample 0 of each of these pixels.
+    Listed(&'a [(u32, u32)]),
+    /// Passes over a tile.
+    Tile {
+        /// The tile's upper left pixel.
+        corner: (u32, u32),
+        /// The passes.
+        passes: Passes,
+        /// Sample of the first pass.
+        first: u32,
+    },
+}
+
+impl Spots<'_> {
+    /// That of ray `i`.
+    pub fn at(self, i: usize) -> Spot {
+        match self {
+            Self::Listed(pixels) => Spot { x: pixels[i].0, y: pixels[i].1, sample: 0 },
+            Self::Tile { corner: (x, y), passes, first } => {
+                let (pass, pixel) = passes.of_ray(i);
+                let (dx, dy) = morton_decode(pixel as u32);
+                Spot { x: x + dx, y: y + dy, sample: first + pass }
+            }
+        }
+    }
 }
 
 /// The random numbers of a sample.

@@ -27,15 +27,18 @@ pub(super) fn depth(out: &mut Samples) {
 
 /// Shows `value` of what was hit.
 fn show(out: &mut Samples, value: impl Fn(&FirstHit) -> DVec3) {
-    for (color, hit) in out.colors.iter_mut().zip(&out.hits).filter(|(color, _)| color.alpha > 0.0) {
-        color.radiance = value(hit);
+    for (i, hit) in out.hits.iter().enumerate() {
+        let color = out.colors.get(i);
+        if color.alpha > 0.0 {
+            out.colors.set(i, Rgba { radiance: value(hit), ..color });
+        }
     }
 }
 
 /// Node visits as heat, also of misses, on a fixed logarithmic scale so that two pictures can be compared.
 pub(super) fn cost(out: &mut Samples) {
-    for (color, hit) in out.colors.iter_mut().zip(&out.hits) {
-        *color = Rgba { radiance: heat((1.0 + hit.nodes).log2() / HOTTEST_LOG2), alpha: 1.0 };
+    for (i, hit) in out.hits.iter().enumerate() {
+        out.colors.set(i, Rgba { radiance: heat((1.0 + hit.nodes).log2() / HOTTEST_LOG2), alpha: 1.0 });
     }
 }
 
@@ -53,8 +56,9 @@ mod tests {
     fn first_hit_views_by_hand() {
         let hit = FirstHit { distance: 2.5, normal: -DVec3::Z, ..FirstHit::NONE };
         let opaque = Rgba { alpha: 1.0, ..Rgba::default() };
-        let mut out = Samples { colors: vec![opaque, Rgba::default()], hits: vec![hit, FirstHit::NONE] };
-        let colors = |out: &Samples| [out.colors[0].radiance, out.colors[1].radiance];
+        let mut out =
+            Samples { colors: [opaque, Rgba::default()].into_iter().collect(), hits: vec![hit, FirstHit::NONE] };
+        let colors = |out: &Samples| [0, 1].map(|i| out.colors.get(i).radiance);
         normals(&mut out);
         assert_eq!(colors(&out), [DVec3::new(0.5, 0.5, 0.0), DVec3::ZERO]);
         depth(&mut out);
@@ -64,9 +68,9 @@ mod tests {
     #[test]
     fn dearer_is_brighter() {
         let hits: Vec<_> = [0.0, 1.0, 7.0, 30.0, 63.0, 1e9].map(|nodes| FirstHit { nodes, ..FirstHit::NONE }).into();
-        let mut out = Samples { colors: vec![Rgba::default(); hits.len()], hits };
+        let mut out = Samples { colors: hits.iter().map(|_| Rgba::default()).collect(), hits };
         cost(&mut out);
-        let out = out.colors;
+        let out: Vec<Rgba> = (0..out.colors.len()).map(|i| out.colors.get(i)).collect();
         let luminance = |s: &Rgba| s.radiance.dot(DVec3::new(0.2126, 0.7152, 0.0722));
         assert!(out.windows(2).all(|w| luminance(&w[0]) <= luminance(&w[1])));
         assert_eq!(out[2].radiance, HEAT[2], "log2(8) is the middle of 0 to 6");

@@ -6,13 +6,14 @@ use glam::DVec3;
 
 use super::branches::Branches;
 use super::classic::refracted;
+use super::colors::Colors;
 use super::lights::Lamp;
 use super::meeting::met_lanes;
 use super::sample::Rgba;
 use super::shader::{Shader, Workspace};
-use super::spot::Spot;
+use super::spot::Spots;
 use super::vertices::{DIFFUSE, EMISSION, ETA, MIRROR, NORMAL, POSITION, THROUGH, Vertices};
-use crate::lanes::chosen::{at, lanes_of, spill};
+use crate::lanes::chosen::lanes_of;
 use crate::lanes::space::{add, choose, scale, times};
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each};
 use crate::ray::Rays;
@@ -42,19 +43,24 @@ impl<S: Real> Shader<'_, S> {
     /// scene sees the background. Light passes glass straight on its way from a light.
     ///
     /// `work.hits` are the hits of `rays`. A sample's terms are added level by level and light by light.
-    pub(super) fn whitted(&self, rays: &Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut [Rgba]) {
+    pub(super) fn whitted(&self, rays: &Rays<S>, spots: Spots<'_>, work: &mut Workspace<S>, out: &mut Colors) {
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
-            let missed = rays.live_lanes(first) & !met_lanes(&work.hits, first);
+            let unmet = S::Wide::ALL & !met_lanes(&work.hits, first);
+            if unmet == 0 {
+                continue;
+            }
+            let missed = unmet & rays.live_lanes(first);
+            if let Some(behind) = self.even_beyond() {
+                out.set_lanes::<S::Wide>(first, missed, background(behind));
+                continue;
+            }
             for i in lanes_of(missed).map(|lane| first + lane) {
-                let behind = self.beyond(DVec3::from(rays.dir(i).map(S::to_f64)));
-                out[i].radiance = behind;
-                // A background that shines is part of the picture; a black one stays transparent.
-                out[i].alpha = f64::from(u8::from(behind != DVec3::ZERO));
+                out.set(i, background(self.beyond(DVec3::from(rays.dir(i).map(S::to_f64)))));
             }
         }
-        let mut memory = std::mem::take(&mut work.whitted);
-        let Memory { now, next, shadows } = &mut memory;
-        let mut vertices = std::mem::take(&mut work.vertices);
+        let mut memory = work.whitted.take().unwrap_or_default();
+        let Memory { now, next, shadows } = &mut *memory;
+        let mut vertices = work.vertices.take().unwrap_or_default();
         now.start(rays.len());
         for level in 0..=self.settings.depth {
             let level_rays = if level == 0 { rays } else { &now.rays };
@@ -74,17 +80,19 @@ impl<S: Real> Shader<'_, S> {
             if now.len() == 0 {
                 break;
             }
-            self.intersect(&now.rays, work, |i, layer| self.draw(spots[now.path[i] as usize]).number(level + 1, layer));
+            self.intersect(&now.rays, work, |i, layer| {
+                self.draw(spots.at(now.path[i] as usize)).number(level + 1, layer)
+            });
             for i in (0..now.len()).filter(|i| !work.hits.is_hit(*i)) {
                 let behind = self.beyond(DVec3::from(now.rays.dir(i).map(S::to_f64)));
-                out[now.path[i] as usize].radiance += now.weight_of(i) * behind;
+                out.add(now.path[i] as usize, now.weight_of(i) * behind);
             }
         }
-        (work.whitted, work.vertices) = (memory, vertices);
+        (work.whitted, work.vertices) = (Some(memory), Some(vertices));
     }
 
     /// Adds what points show without any light's help.
-    fn add_unlit(&self, level: &Level<'_, S>, out: &mut [Rgba]) {
+    fn add_unlit(&self, level: &Level<'_, S>, out: &mut Colors) {
         let Level { carried, vertices, .. } = level;
         let ambient = self.ambient.to_array().map(S::Wide::constant);
         for (first, lanes) in vertices.packets() {
@@ -98,10 +106,7 @@ impl<S: Real> Shader<'_, S> {
             let nothing = [S::Wide::constant(0.0); 3];
             let emitted = choose(shines, vertices.vector(EMISSION, first), nothing);
             let value = carried.weighed(first, add(emitted, reflected));
-            let columns = spill(value);
-            for lane in lanes_of(lanes) {
-                out[carried.path[first + lane] as usize].radiance += radiance(at(&columns, lane));
-            }
+            carried.shine(first, lanes, value, out);
         }
     }
 
@@ -112,7 +117,7 @@ impl<S: Real> Shader<'_, S> {
         level: &Level<'_, S>,
         shadows: &mut Branches<S>,
         work: &mut Workspace<S>,
-        out: &mut [Rgba],
+        out: &mut Colors,
     ) {
         let Level { rays, carried, vertices } = level;
         let lamp = Lamp::<S::Wide>::new(light);
@@ -127,14 +132,12 @@ impl<S: Real> Shader<'_, S> {
             if lit == 0 {
                 continue;
             }
-            let path = &carried.path[first..];
             if self.shadows {
                 let org = vertices.leave(first);
                 let (dir, t_max) = lamp.segment(org);
-                shadows.push(lit, path, [org, dir, value], t_max);
+                shadows.push(lit, &carried.path[first..], [org, dir, value], t_max);
             } else {
-                let columns = spill(value);
-                lanes_of(lit).for_each(|lane| out[path[lane] as usize].radiance += radiance(at(&columns, lane)));
+                carried.shine(first, lit, value, out);
             }
         }
         shadows.close();
@@ -143,9 +146,14 @@ impl<S: Real> Shader<'_, S> {
         }
         work.rays.shadow += shadows.rays.live_count() as u64;
         self.occlude(&shadows.rays, work, true, |i, left| {
-            out[shadows.path[i] as usize].radiance += shadows.weight_of(i) * left;
+            out.add(shadows.path[i] as usize, shadows.weight_of(i) * left);
         });
     }
+}
+
+/// A background that shines is part of the picture; a black one stays transparent.
+pub(super) fn background(radiance: DVec3) -> Rgba {
+    Rgba { radiance, alpha: f64::from(u8::from(radiance != DVec3::ZERO)) }
 }
 
 /// The mirrored and refracted rays of `level` that carry enough light into `next`, all mirrored ones first.
@@ -184,10 +192,6 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
     let mirrored = next.rays.live_among(count_mirrored);
     work.rays.mirror += mirrored as u64;
     work.rays.refracted += (next.rays.live_count() - mirrored) as u64;
-}
-
-fn radiance<S: Real>(color: [S; 3]) -> DVec3 {
-    DVec3::from(color.map(S::to_f64))
 }
 
 /// Directions `dir` mirrored at planes with unit normals `normal`; the length stays.

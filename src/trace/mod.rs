@@ -14,6 +14,7 @@ mod solids;
 mod stream;
 mod tile;
 mod traverse;
+mod void;
 
 use std::marker::PhantomData;
 
@@ -23,6 +24,7 @@ use crate::ray::{Counters, HitPacket, Hits, Packet, Pencil, Rays};
 use crate::scene::world::World;
 pub use all::{Stretch, stretches};
 use query::{Query, Stack};
+pub use void::is_void;
 
 /// Per-thread working memory of engines; grows on use, reusable for any world.
 #[derive(Debug, Default)]

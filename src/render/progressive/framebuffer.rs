@@ -110,7 +110,7 @@ mod tests {
         let mut patch = Patch::default();
         let mut put = |frame: &mut Framebuffer, pixel, value| {
             let gray = Rgba { radiance: DVec3::splat(value), alpha: 1.0 };
-            let samples = Samples { colors: vec![gray], hits: Vec::new() };
+            let samples = Samples { colors: [gray].into_iter().collect(), hits: Vec::new() };
             patch.fill(&channels, window, Layout::Listed(&[pixel]), Finished::Samples(&samples));
             frame.paint(&patch);
         };

@@ -264,8 +264,7 @@ impl<'a, S: Real> Progressive<'a, S> {
             if tile.samples >= samples {
                 return Tally::default();
             }
-            self.canvas.list_pixels(*number, memory);
-            tile.sums.make_room(memory.pixels.len());
+            tile.sums.make_room(self.canvas.tiling.rays_per_tile() as usize);
             while tile.samples < samples {
                 if stop(watch, stopped) {
                     return Tally::take(&mut memory.work, 0);

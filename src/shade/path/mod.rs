@@ -46,7 +46,7 @@ use super::meeting::{Meeting, Met, met_lanes};
 use super::offset::position_error;
 use super::sample::Samples;
 use super::shader::{Settings, Workspace};
-use super::spot::{Draw, Spot};
+use super::spot::{Draw, Spots};
 use super::stats::BounceStats;
 use super::through::{Again, MIXTURE, Through};
 use crate::lanes::chosen::{Chosen, at, lanes_of, spill};
@@ -127,10 +127,10 @@ impl<'a, S: Real> Paths<'a, S> {
 
     /// The radiance along each ray of the primary batch `rays` into `out`, which holds misses; see
     /// [`super::Shader::shade`].
-    pub fn shade(&self, rays: &Rays<S>, spots: &[Spot], work: &mut Workspace<S>, out: &mut Samples) {
+    pub fn shade(&self, rays: &Rays<S>, spots: Spots<'_>, work: &mut Workspace<S>, out: &mut Samples) {
         let mut memory = std::mem::take(&mut work.paths);
         memory.draws.clear();
-        memory.draws.extend(spots.iter().map(|spot| Draw::new(*spot, self.seed)));
+        memory.draws.extend((0..rays.len()).map(|i| Draw::new(spots.at(i), self.seed)));
         memory.start(rays);
         for bounce in 0..=self.depth {
             if memory.now.path.is_empty() {
@@ -242,7 +242,7 @@ impl<'a, S: Real> Paths<'a, S> {
                 };
                 if bounce == 0 {
                     let path = memory.now.path[first + lane] as usize;
-                    out.colors[path].alpha = 1.0;
+                    out.colors.make_opaque(path);
                     if let Some(seen) = out.hits.get_mut(path) {
                         let (org, dir) = memory.now.line(first + lane);
                         let arrival = self.met(first + lane, org, dir, hits).resolved(self, material[lane], dir);
@@ -262,7 +262,7 @@ impl<'a, S: Real> Paths<'a, S> {
             let path = wave.path[i] as usize;
             out.shine(path, bounce, light);
             if bounce == 0 && light != DVec3::ZERO {
-                out.colors[path].alpha = 1.0;
+                out.colors.make_opaque(path);
             }
         };
         let Some((radiance, pdf)) = self.lights.even() else {
@@ -303,7 +303,7 @@ impl<'a, S: Real> Paths<'a, S> {
             if self.looks.has_mixtures { self.looks.resolve(surface.material, choice()) } else { surface.material };
         let arrival = met.resolved(self, material, dir);
         if bounce == 0 {
-            out.colors[path].alpha = 1.0;
+            out.colors.make_opaque(path);
             if let Some(seen) = out.hits.get_mut(path) {
                 arrival.show(i, dir, hits, seen);
             }

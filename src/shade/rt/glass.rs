@@ -27,7 +27,7 @@ pub(super) fn refract(dir: DVec3, normal: DVec3, from: f64, to: f64) -> Result<D
 }
 
 /// Path `i` of `level`, inside glass, has met something: it leaves, or is reflected and goes on inside.
-pub(super) fn step<S: Real>(level: &Level<S>, i: usize, found: &Found<S>, next: &mut Vec<Path>) {
+pub(super) fn step<S: Real>(level: &Level<S>, i: usize, found: &Found<S>, next: &mut Level<S>) {
     let path = level.path(i);
     let Some(within) = path.carry.within else { return };
     let escape = |org: DVec3, dir: DVec3| {
@@ -36,17 +36,17 @@ pub(super) fn step<S: Real>(level: &Level<S>, i: usize, found: &Found<S>, next: 
     };
     if !found.is_hit(i) || !found.is_leaving(i) {
         // Something else is in the glass, or the ray only grazed it.
-        next.push(escape(path.org, path.dir));
+        next.push(&escape(path.org, path.dir));
         return;
     }
     let position = found.position(i);
     match refract(path.dir, found.normal(i), within.index, AIR) {
-        Ok(dir) => next.push(escape(position, dir)),
+        Ok(dir) => next.push(&escape(position, dir)),
         Err(dir) if within.reflections < MAX_REFLECTIONS => {
             let within = Some(Within { reflections: within.reflections + 1, ..within });
-            next.push(Path { org: position, dir, carry: Carry { within, ..path.carry } });
+            next.push(&Path { org: position, dir, carry: Carry { within, ..path.carry } });
         }
-        Err(_) => next.push(escape(position, path.dir)),
+        Err(_) => next.push(&escape(position, path.dir)),
     }
 }
 

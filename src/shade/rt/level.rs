@@ -3,14 +3,17 @@
 use glam::DVec3;
 
 use super::{Carry, Path, TOLERANCE};
-use crate::lanes::chosen::{at, lanes_of, spill};
+use crate::lanes::chosen::{Chosen, at, lanes_of, spill};
 use crate::lanes::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, map3, space};
 use crate::ray::{Hits, Rays};
 use crate::scene::world::World;
-use crate::shade::sample::{Rgba, Samples};
+use crate::shade::sample::Samples;
 
 /// Roundings of a point on a surface that a ray from there may still meet the surface within.
 const ROUNDINGS: f64 = 64.0;
+
+/// Paths that one sends on, at most: through glass, and mirrored.
+const MOST_SENT: usize = 2;
 
 /// Where a ray from a point `org` on a surface begins to count: at the tolerance, which the digits of `f32` do not reach
 /// far from the origin.
@@ -27,6 +30,12 @@ pub(super) fn vector<S: Real>(from: &[Column<S>; 3], first: usize) -> Lanes3<S::
     [S::Wide::load(&from[0][first..]), S::Wide::load(&from[1][first..]), S::Wide::load(&from[2][first..])]
 }
 
+/// The direction that rays along `dir` have here.
+pub(super) fn unit<S: Real>(dir: DVec3) -> [S; 3] {
+    let dir = map3(dir.to_array(), |x| S::Wide::splat(S::from_f64(x)));
+    map3(space::normalize(dir), |x| x.lane(0))
+}
+
 /// Rays of paths.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Level<S> {
@@ -36,28 +45,41 @@ pub(super) struct Level<S> {
     carry: Vec<Carry>,
     /// Of each vector of lanes: those inside glass; none for primary rays.
     within: Vec<u32>,
+    /// The direction of all rays, if they have one.
+    parallel: Option<[S; 3]>,
+    /// Whether all rays of all vectors are live.
+    is_full: bool,
 }
 
 impl<S: Real> Level<S> {
-    /// The primary rays `rays`, which are lent; dead ones stay dead.
-    pub fn start(&mut self, rays: &mut Rays<S>) {
+    /// The primary rays `rays`, which are lent, `live` of them live; dead ones stay dead. All look in the direction `parallel`, if
+    /// there is one.
+    pub fn start(&mut self, rays: &mut Rays<S>, live: u64, parallel: Option<DVec3>) {
         std::mem::swap(&mut self.rays, rays);
         let rays = &mut self.rays;
         self.carry.clear();
         self.within.clear();
-        let tolerance = S::Wide::constant(TOLERANCE);
-        // Those of parallel projection all have one direction.
-        let mut last = [[S::Wide::constant(0.0); 3]; 2];
-        for first in (0..rays.padded_len()).step_by(S::Wide::N) {
-            let dir = vector(&rays.dir, first);
-            let [x, y, z] = each(|axis| dir[axis].cmp_eq(last[0][axis]));
-            if (x & y & z).bits() != S::Wide::ALL {
-                last = [dir, space::normalize(dir)];
+        let padded = rays.padded_len();
+        self.is_full = live == padded as u64;
+        let given = parallel.map(|dir| map3(dir.to_array(), S::from_f64));
+        self.parallel = parallel.map(unit);
+        match self.parallel {
+            // Dead ones may have that direction, too.
+            Some(unit) if self.parallel != given => (0..3).for_each(|axis| rays.dir[axis][..padded].fill(unit[axis])),
+            Some(_) => {}
+            None => {
+                for first in (0..padded).step_by(S::Wide::N) {
+                    let unit = space::normalize(vector(&rays.dir, first));
+                    (0..3).for_each(|axis| unit[axis].store(&mut rays.dir[axis][first..]));
+                }
             }
-            let dir = last[1];
-            (0..3).for_each(|axis| dir[axis].store(&mut rays.dir[axis][first..]));
-            tolerance.fast_max(S::Wide::load(&rays.t_min[first..])).store(&mut rays.t_min[first..]);
         }
+        let tolerance = S::from_f64(TOLERANCE);
+        if self.is_full {
+            return rays.t_min[..padded].fill(tolerance);
+        }
+        // Those of dead rays are later than their ends.
+        rays.t_min[..padded].iter_mut().for_each(|t_min| *t_min = if *t_min < tolerance { tolerance } else { *t_min });
     }
 
     /// Ends what [`Self::start`] began: the batch goes back.
@@ -65,19 +87,41 @@ impl<S: Real> Level<S> {
         std::mem::swap(&mut self.rays, rays);
     }
 
-    /// The paths `paths`.
-    pub fn open(&mut self, paths: &[Path]) {
-        self.rays.open(paths.len());
+    /// No paths yet, with room for those that `parents` paths send on; [`Self::close`] ends the additions.
+    pub fn open(&mut self, parents: usize) {
+        (self.parallel, self.is_full) = (None, false);
+        self.rays.open(MOST_SENT * parents + MAX_LANES);
         self.carry.clear();
         self.within.clear();
         self.within.resize(self.rays.padded_len() / S::Wide::N, 0);
-        for (i, path) in paths.iter().enumerate() {
-            let (org, dir) = (map3(path.org.to_array(), S::from_f64), map3(path.dir.to_array(), S::from_f64));
-            self.rays.set(i, org, dir, start(org), S::INFINITY);
-            self.within[i / S::Wide::N] |= u32::from(path.carry.within.is_some()) << (i % S::Wide::N);
-            self.carry.push(path.carry);
-        }
-        self.rays.close(paths.len());
+    }
+
+    /// Adds a path.
+    pub fn push(&mut self, path: &Path) {
+        let i = self.carry.len();
+        let [org, dir] = [path.org, path.dir].map(|v| map3(v.to_array(), S::from_f64));
+        self.rays.set(i, org, dir, start(org), S::INFINITY);
+        self.within[i / S::Wide::N] |= u32::from(path.carry.within.is_some()) << (i % S::Wide::N);
+        self.carry.push(path.carry);
+    }
+
+    /// Adds paths of the lanes `lanes` of a vector, outside of glass; `carry` is what that of a lane carries.
+    #[inline]
+    pub fn put(&mut self, lanes: u32, [org, dir]: [Lanes3<S::Wide>; 2], carry: impl Fn(usize) -> Carry) {
+        let segment = [start(org), S::Wide::splat(S::INFINITY)];
+        self.rays.put(self.carry.len(), &Chosen::of(lanes), [org, dir], segment);
+        self.carry.extend(lanes_of(lanes).map(carry));
+    }
+
+    /// Ends the additions.
+    pub fn close(&mut self) {
+        self.rays.close(self.carry.len());
+    }
+
+    /// Directions of rays `first..first + N`.
+    #[inline(always)]
+    pub fn dir(&self, first: usize) -> Lanes3<S::Wide> {
+        self.parallel.map_or_else(|| vector(&self.rays.dir, first), |dir| map3(dir, S::Wide::splat))
     }
 
     /// Number of rays.
@@ -94,6 +138,9 @@ impl<S: Real> Level<S> {
     /// Of vector `k` of lanes those that are rays at all, and those of them that are inside glass.
     #[inline]
     pub fn lanes(&self, k: usize) -> [u32; 2] {
+        if self.is_full {
+            return [S::Wide::ALL, 0];
+        }
         let load = |from: &[S]| S::Wide::load(&from[k * S::Wide::N..]);
         let live = load(&self.rays.t_min).cmp_le(load(&self.rays.t_max)).bits();
         [live, live & self.within.get(k).copied().unwrap_or(0)]
@@ -108,21 +155,18 @@ impl<S: Real> Level<S> {
     /// something once at most, make theirs opaque.
     #[inline]
     pub fn show(&self, first: usize, lanes: u32, color: Lanes3<S::Wide>, out: &mut Samples) {
+        if lanes == 0 {
+            return;
+        }
+        if self.is_primary() {
+            out.colors.make_lanes_opaque::<S::Wide>(first, lanes);
+            return out.colors.add_lanes(first, lanes, color);
+        }
         let color = spill(color);
-        let color = |lane: usize| DVec3::from(map3(at(&color, lane % MAX_LANES), S::to_f64));
-        // 0 + -0 is 0, as in a sum.
-        let alone = |lane: usize| Rgba { radiance: DVec3::ZERO + color(lane), alpha: 1.0 };
-        if !self.is_primary() {
-            for lane in lanes_of(lanes) {
-                let carry = &self.carry[first + lane];
-                out.colors[carry.pixel as usize].radiance += carry.throughput * color(lane);
-            }
-        } else if lanes == S::Wide::ALL {
-            // Primary rays, each with a pixel of its own: a loop of known length.
-            let pixels = &mut out.colors[first..first + S::Wide::N];
-            pixels.iter_mut().enumerate().for_each(|(lane, pixel)| *pixel = alone(lane));
-        } else {
-            lanes_of(lanes).for_each(|lane| out.colors[first + lane] = alone(lane));
+        for lane in lanes_of(lanes) {
+            let carry = &self.carry[first + lane];
+            let color = DVec3::from(map3(at(&color, lane % MAX_LANES), S::to_f64));
+            out.colors.add(carry.pixel as usize, carry.throughput * color);
         }
     }
 
@@ -151,11 +195,11 @@ pub(super) struct Found<S> {
 }
 
 impl<S: Real> Found<S> {
-    /// Of `rays`, whose hits are `hits`. A call of its own, with all of it inside: one call for each vector takes longer.
+    /// Of the rays of `level`, whose hits are `hits`. A call of its own, with all of it inside: one call for each vector takes longer.
     #[inline(never)]
-    pub fn set(&mut self, world: &World<S>, rays: &Rays<S>, hits: &Hits<S>) {
-        self.open(rays.padded_len());
-        (0..self.hit.len()).for_each(|k| self.set_vector(k, world, rays, hits));
+    pub fn set(&mut self, world: &World<S>, level: &Level<S>, hits: &Hits<S>) {
+        self.open(level.rays.padded_len());
+        (0..self.hit.len()).for_each(|k| self.set_vector(k, world, &level.rays, level.dir(k * S::Wide::N), hits));
     }
 
     /// Nothing yet, of `padded` rays; [`Self::set_vector`] sets some.
@@ -167,16 +211,16 @@ impl<S: Real> Found<S> {
         self.leaving.resize(padded / S::Wide::N, 0);
     }
 
-    /// Sets what vector `k` of lanes has met.
+    /// Sets what vector `k` of lanes of `rays`, whose directions are `dir`, has met.
     #[inline(always)]
-    pub fn set_vector(&mut self, k: usize, world: &World<S>, rays: &Rays<S>, hits: &Hits<S>) {
+    pub fn set_vector(&mut self, k: usize, world: &World<S>, rays: &Rays<S>, dir: Lanes3<S::Wide>, hits: &Hits<S>) {
         let first = k * S::Wide::N;
         let met = world.met(rays, hits, first);
         (self.hit[k], self.leaving[k]) = (met.hit, 0);
         if met.hit == 0 {
             return;
         }
-        self.leaving[k] = S::Wide::constant(0.0).cmp_lt(dot(met.normal, vector(&rays.dir, first))).bits() & met.hit;
+        self.leaving[k] = S::Wide::constant(0.0).cmp_lt(dot(met.normal, dir)).bits() & met.hit;
         for axis in 0..3 {
             met.position[axis].store(&mut self.position[axis][first..]);
             met.normal[axis].store(&mut self.normal[axis][first..]);

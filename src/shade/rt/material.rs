@@ -20,6 +20,13 @@ pub(super) struct Finish {
     pub index: f64,
 }
 
+impl Finish {
+    /// Whether it mirrors some of the light and lets none pass.
+    pub fn is_plain_mirror(&self) -> bool {
+        self.transmit <= 0.0 && self.reflect > 0.0 && self.reflect < 1.0
+    }
+}
+
 const PLASTIC: Finish = Finish { shine: 10.0, specular: 0.7, diffuse: 0.3, transmit: 0.0, reflect: 0.0, index: 1.0 };
 const MIRROR: Finish = Finish { shine: 4.0, specular: 0.6, diffuse: 0.4, transmit: 0.0, reflect: 0.75, index: 1.65 };
 const GLASS: Finish = Finish { shine: 4.0, specular: 0.7, diffuse: 0.3, transmit: 0.8, reflect: 0.1, index: 1.65 };

@@ -29,15 +29,17 @@ use self::level::{Found, Level};
 use self::material::RtMaterial;
 use self::meetings::Meetings;
 use self::shadow::Probes;
+use super::colors::Colors;
 use super::sample::{FirstHit, Rgba, Samples};
 use super::shader::{Shader, Workspace};
 use crate::camera::Camera;
-use crate::lanes::Real;
+use crate::lanes::{Lanes, Real, map3};
 use crate::ray::Rays;
 use crate::scene::assembly::AssemblyObject;
 use crate::scene::brlcad::describe::Looks;
 pub use material::unknown_shaders;
 use pattern::Pattern;
+use sort::Sky;
 
 /// Surfaces nearer than this along a ray, mm, are behind it.
 const TOLERANCE: f64 = 0.0005;
@@ -62,6 +64,8 @@ pub(super) struct Rt {
     lamps: Vec<Lamp>,
     surroundings: Option<Pattern>,
     endless: Endless,
+    /// The direction of all primary rays, if they have one.
+    parallel: Option<DVec3>,
 }
 
 /// A ray on its way.
@@ -110,6 +114,8 @@ struct Within {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Memory<S> {
     level: Level<S>,
+    /// The paths that go on.
+    next: Level<S>,
     found: Found<S>,
     meetings: Meetings<S>,
     probes: Probes<S>,
@@ -118,9 +124,9 @@ pub(super) struct Memory<S> {
     shadow: Found<S>,
     /// Rays that look back.
     back: Level<S>,
-    /// Of each vector of lanes: those that meet nothing.
+    /// Of each vector of lanes: those that meet nothing, but may be inside something without end.
     lost: Vec<u32>,
-    /// Those of them that are inside something without end.
+    /// Those of them that are.
     inside: Vec<u32>,
     /// Primary rays that met something and may look like the background.
     dark: Vec<u32>,
@@ -133,38 +139,49 @@ impl Rt {
         let materials: Vec<RtMaterial> = looks.regions.iter().map(RtMaterial::of).collect();
         let surroundings = looks.surroundings.as_ref().and_then(|shader| Pattern::of(shader.layers.first()?));
         let endless = Endless::new(looks, object);
-        Self { lamps: lamp::lamps(looks, &materials, camera), materials, surroundings, endless }
+        let parallel = camera.parallel.then_some(-camera.n);
+        Self { lamps: lamp::lamps(looks, &materials, camera), materials, surroundings, endless, parallel }
+    }
+
+    /// What surrounds the scene, if all primary rays see the same of it.
+    pub fn surroundings<S: Real>(&self) -> Option<[S; 3]> {
+        let dir = match (&self.surroundings, self.parallel) {
+            (Some(_), None) => return None,
+            (_, dir) => level::unit(dir.unwrap_or(DVec3::X)),
+        };
+        Some(map3(Sky::new(self).color::<S>(map3(dir, S::Wide::splat), 1), |x| x.lane(0)))
     }
 }
 
 impl<S: Real> Shader<'_, S> {
-    /// What each primary ray of `rays` sees in `rt`'s lighting model.
-    pub(super) fn rt(&self, rt: &Rt, rays: &mut Rays<S>, work: &mut Workspace<S>, out: &mut Samples) {
-        let mut memory = std::mem::take(&mut work.rt);
-        memory.level.start(rays);
+    /// What each primary ray of `rays`, of which `live` are, sees in `rt`'s lighting model.
+    pub(super) fn rt(&self, rt: &Rt, rays: &mut Rays<S>, live: u64, work: &mut Workspace<S>, out: &mut Samples) {
+        // A pointer: what it points to is large.
+        let mut memory = work.rt.take().unwrap_or_default();
+        memory.level.start(rays, live, rt.parallel);
         memory.dark.clear();
-        let mut next = Vec::new();
         let mut is_primary = true;
         while memory.level.len() > 0 {
+            memory.next.open(memory.level.len());
             self.intersect_all(&memory.level.rays, work);
-            memory.found.set(self.world, &memory.level.rays, &work.hits);
+            memory.found.set(self.world, &memory.level, &work.hits);
             if !is_primary {
                 work.rays.mirror += memory.level.len() as u64;
             } else {
                 see(&memory.found, &mut out.hits);
             }
-            self.rt_sort(rt, &mut memory, &work.hits, &mut next, out);
+            self.rt_sort(rt, &mut memory, &work.hits, out);
             self.rt_lost(rt, &mut memory, work, out);
-            self.rt_light(rt, &mut memory, &mut next, work, out);
+            self.rt_light(rt, &mut memory, work, out);
             if is_primary {
                 memory.level.give_back(rays);
             }
-            memory.level.open(&next);
-            next.clear();
+            memory.next.close();
+            std::mem::swap(&mut memory.level, &mut memory.next);
             is_primary = false;
         }
-        memory.dark.iter().for_each(|&pixel| not_the_background(&mut out.colors[pixel as usize]));
-        work.rt = memory;
+        memory.dark.iter().for_each(|&pixel| not_the_background(&mut out.colors, pixel as usize));
+        work.rt = Some(memory);
     }
 }
 
@@ -178,9 +195,10 @@ fn see<S: Real>(found: &Found<S>, out: &mut [FirstHit]) {
 }
 
 /// `rt` keeps the background's colour for the background: a hit of that very colour becomes one step bluer.
-fn not_the_background(seen: &mut Rgba) {
+fn not_the_background(seen: &mut Colors, pixel: usize) {
     let byte = |x: f64| (x * 255.0 + 0.5) as u8;
-    if seen.radiance.to_array().map(byte) == [0, 0, 1] {
-        seen.radiance = DVec3::new(0.0, 0.0, 2.0 / 255.0);
+    let color = seen.get(pixel);
+    if color.radiance.to_array().map(byte) == [0, 0, 1] {
+        seen.set(pixel, Rgba { radiance: DVec3::new(0.0, 0.0, 2.0 / 255.0), ..color });
     }
 }

@@ -9,22 +9,15 @@ use super::material::Finish;
 use super::meetings::Meetings;
 use super::shadow::Probes;
 use super::{AIR, AMBIENT, DARK, MAX_BOUNCES, Memory, Path, Rt, TOLERANCE, Within};
-use crate::lanes::chosen::lanes_of;
-use crate::lanes::{Column, LaneMask, Lanes, Lanes3, Real, dot, each, space};
+use crate::lanes::chosen::{lanes_of, positions_in};
+use crate::lanes::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each, space};
 use crate::shade::sample::Samples;
 use crate::shade::shader::{Shader, Workspace};
 
 impl<S: Real> Shader<'_, S> {
-    /// Lights the meetings of a level, adds what they show to the pixels and puts mirror and glass rays into `next`.
-    pub(super) fn rt_light(
-        &self,
-        rt: &Rt,
-        memory: &mut Memory<S>,
-        next: &mut Vec<Path>,
-        work: &mut Workspace<S>,
-        out: &mut Samples,
-    ) {
-        let Memory { level, found, meetings, probes, next_probes, shadow, dark, .. } = memory;
+    /// Lights the meetings of a level, adds what they show to the pixels and sends mirror and glass rays on.
+    pub(super) fn rt_light(&self, rt: &Rt, memory: &mut Memory<S>, work: &mut Workspace<S>, out: &mut Samples) {
+        let Memory { level, next, found, meetings, probes, next_probes, shadow, dark, .. } = memory;
         unlit(rt, level, found, meetings);
         for lamp in rt.lamps.iter().rev() {
             let padded = meetings.padded();
@@ -40,7 +33,9 @@ impl<S: Real> Shader<'_, S> {
         }
         for k in 0..meetings.kinds.len() {
             let (first, kinds) = (k * S::Wide::N, meetings.kinds[k]);
-            for i in lanes_of(kinds.sends).map(|lane| first + lane) {
+            let mirrors =
+                if kinds.sends == 0 { 0 } else { mirror(rt, level, found, meetings, first, kinds.sends, next) };
+            for i in lanes_of(kinds.sends & !mirrors).map(|lane| first + lane) {
                 let Some(finish) = &rt.materials[found.region[i] as usize].finish else { continue };
                 let of = |list: &[Column<S>; 3]| DVec3::from(each(|axis| list[axis][i].to_f64()));
                 let (base, color) = (of(&meetings.base), of(&meetings.color));
@@ -67,7 +62,7 @@ fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Me
     let Meetings { kinds, base, color, .. } = meetings;
     for (k, kinds) in kinds.iter().enumerate().filter(|(_, kinds)| kinds.entering != 0) {
         let first = k * S::Wide::N;
-        let (normal, dir) = (vector(&found.normal, first), vector(&level.rays.dir, first));
+        let (normal, dir) = (vector(&found.normal, first), level.dir(first));
         let zero = S::Wide::constant(0.0);
         let facing = zero - dot(normal, dir);
         let ambient = zero.fast_max(facing) * S::Wide::constant(AMBIENT);
@@ -133,7 +128,7 @@ fn light<S: Real>(lamp: &Lamp, level: &Level<S>, found: &Found<S>, meetings: &mu
         }
         let lit = <S::Wide as Lanes>::Mask::from_bits(lit);
         let to_light = vector(to_light, first);
-        let (normal, dir) = (vector(&found.normal, first), vector(&level.rays.dir, first));
+        let (normal, dir) = (vector(&found.normal, first), level.dir(first));
         let cosine = dot(normal, to_light);
         let [shine, specular, diffuse] = vector(finish, first);
         let diffuse = zero.fast_max(diffuse * cosine);
@@ -153,6 +148,51 @@ fn light<S: Real>(lamp: &Lamp, level: &Level<S>, found: &Found<S>, meetings: &mu
     }
 }
 
+/// Sends on the mirror rays of those of `lanes`, rays `first + lane`, that meet plain mirrors, and leaves what remains of their own
+/// colours, as [`send_on`] does. Which lanes these are.
+#[inline(never)]
+fn mirror<S: Real>(
+    rt: &Rt,
+    level: &Level<S>,
+    found: &Found<S>,
+    meetings: &mut Meetings<S>,
+    first: usize,
+    lanes: u32,
+    next: &mut Level<S>,
+) -> u32 {
+    let regions = &found.region[first..];
+    let is_far = S::Wide::constant(glass::AIR_GAP).cmp_le(S::Wide::load(&found.t[first..])).bits();
+    let may_go_on = |lane: &usize| level.carry(first + lane).level <= MAX_BOUNCES;
+    let plain = lanes_of(lanes & is_far).filter(may_go_on).fold(0u32, |plain, lane| plain | 1 << lane);
+    let (mut rest, mut done) = (plain, 0);
+    while rest != 0 {
+        let region = regions[rest.trailing_zeros() as usize % MAX_LANES];
+        let same = positions_in::<S::Wide>(regions, region) & rest;
+        rest &= !same;
+        let Some(finish) = rt.materials[region as usize].finish.as_ref().filter(|finish| finish.is_plain_mirror())
+        else {
+            continue;
+        };
+        done |= same;
+        let (normal, dir) = (vector(&found.normal, first), level.dir(first));
+        let along = normal[0] * dir[0] + normal[1] * dir[1] + normal[2] * dir[2];
+        let twice = S::Wide::constant(2.0) * along;
+        let mirrored = each(|axis| dir[axis] - normal[axis] * twice);
+        next.put(same, [vector(&found.position, first), mirrored], |lane| {
+            let carry = level.carry(first + lane);
+            let throughput = carry.throughput * finish.reflect;
+            super::Carry { level: carry.level + 1, throughput, left: None, ..carry }
+        });
+        let mask = <S::Wide as Lanes>::Mask::from_bits(same);
+        for column in &mut meetings.color {
+            let color = S::Wide::load(&column[first..]);
+            let own = color * S::Wide::constant(1.0 - finish.reflect);
+            S::Wide::select(mask, own, color).store(&mut column[first..]);
+        }
+    }
+    done
+}
+
 /// Sends mirror and glass rays on from hit `i`; gives what remains of the surface's own colour.
 fn send_on<S: Real>(
     path: Path,
@@ -161,7 +201,7 @@ fn send_on<S: Real>(
     finish: &Finish,
     base: DVec3,
     color: DVec3,
-    next: &mut Vec<Path>,
+    next: &mut Level<S>,
 ) -> DVec3 {
     let carry = path.carry;
     if carry.level > MAX_BOUNCES {
@@ -176,7 +216,7 @@ fn send_on<S: Real>(
     if own >= 1.0 {
         return color;
     }
-    let mut send = |dir: DVec3, carry| next.push(Path { org: position, dir, carry });
+    let mut send = |dir: DVec3, carry| next.push(&Path { org: position, dir, carry });
     if transmit > 0.0 {
         let outside = if t > glass::AIR_GAP { AIR } else { carry.index };
         match refract(path.dir, normal, outside, finish.index) {

@@ -1,6 +1,6 @@
 //! Whether lights are seen from surfaces: one ray to the middle of each, through whatever lets light pass.
 
-use super::level::{Found, start};
+use super::level::{Found, start, vector};
 use super::{Rt, TOLERANCE};
 use crate::lanes::chosen::{Chosen, lanes_of};
 use crate::lanes::words::positions;
@@ -106,7 +106,8 @@ impl<S: Real> Shader<'_, S> {
                     rest &= !simple_verdicts(rt, hit, &regions, slots, &work.hits.t[first..], visible);
                 }
                 if rest != 0 {
-                    found.set_vector(k, self.world, &probes.rays, &work.hits);
+                    let dir = vector(&probes.rays.dir, first);
+                    found.set_vector(k, self.world, &probes.rays, dir, &work.hits);
                 }
                 for i in lanes_of(rest).map(|lane| first + lane) {
                     let (slot, passed) = (probes.slots[i], probes.passed.get(i).copied().unwrap_or(Passed::NOTHING));
