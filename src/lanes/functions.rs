@@ -1,11 +1,6 @@
 //! Functions of numbers over lanes, made of exactly rounded operations: every width gives the same bits.
 
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
-
 use super::{Lanes, Real};
-
-/// Largest argument of [`arctangent`]: the tangent of pi / 8.
-const TAN_PI_8: f64 = 0.414_213_562_373_095_03;
 
 /// Taylor's terms of sin(sqrt x) / sqrt x.
 const SINE: [f64; 8] = [
@@ -48,17 +43,22 @@ pub fn fraction<V: Lanes>(x: V) -> V {
     V::select(from_nearest.cmp_lt(zero), from_nearest + V::constant(1.0), from_nearest)
 }
 
-/// The nearest multiple of 1 / `steps`, a power of two; of numbers as in [`round`], divided by `steps`.
+/// The nearest multiple of 1 / `steps`, a power of two, to `x * factor`, another one, less the nearest whole number: half at
+/// most. The product may be as large as numbers in [`round`], divided by `steps`.
 #[inline(always)]
-pub fn to_steps<V: Lanes>(x: V, steps: f64) -> V {
-    let large = V::constant(0.75 / V::Scalar::EPSILON.to_f64() / steps);
-    (x + large) - large
+pub fn steps_of_part<V: Lanes>(x: V, factor: f64, steps: f64) -> V {
+    let whole = 0.75 / V::Scalar::EPSILON.to_f64();
+    let large = V::constant(whole / steps);
+    let scaled = if factor == 1.0 { x + large } else { x.mul_add(V::constant(factor), large) };
+    // There and back again: on the way the steps behind the point get lost.
+    let further = V::constant(whole - whole / steps);
+    scaled - ((scaled + further) - further)
 }
 
-/// Sine of `x` full turns, half a turn at most. Within 4e-9, beside roundings: the polynomial through six Chebyshev nodes of
+/// `amplitude` times the sine of `x` full turns, half a turn at most. Within 4e-9 of `amplitude`, beside roundings: the polynomial through six Chebyshev nodes of
 /// sin(2 pi sqrt u) / (sqrt u (1/4 - u)), so that zeros are exact.
 #[inline(always)]
-pub fn sine_of_part<V: Lanes>(x: V) -> V {
+pub fn sine_of_part<V: Lanes>(x: V, amplitude: f64) -> V {
     let terms = [
         25.132_741_154_710_772,
         -64.835_822_721_475_301,
@@ -66,7 +66,8 @@ pub fn sine_of_part<V: Lanes>(x: V) -> V {
         -38.495_830_637_736_187,
         14.049_443_530_985_525,
         -3.161_249_825_195_937_7,
-    ];
+    ]
+    .map(|term: f64| term * amplitude);
     let square = x * x;
     polynomial(square, &terms) * ((V::constant(0.25) - square) * x)
 }
@@ -79,44 +80,29 @@ pub fn sin_cos_eighth<V: Lanes>(x: V) -> (V, V) {
     (polynomial(square, &SINE) * x, polynomial(square, &COSINE))
 }
 
-/// The angle of the point (`x`, `y`) from the x axis, -pi to pi; 0 at the origin. `|x| + |y|` must not overflow. Good to
-/// three roundings.
+/// The angle of the point (`x`, `up`), `up >= 0`, from the x axis, in full turns: 0 to a half; 0 at the origin. Within 3e-10,
+/// beside roundings: the polynomial through ten Chebyshev nodes of atan(sqrt u) / (2 pi sqrt u).
 #[inline(always)]
-pub fn angle_of<V: Lanes>(y: V, x: V) -> V {
-    let zero = V::constant(0.0);
-    let (across, up) = (x.abs(), y.abs());
-    let is_steep = across.cmp_lt(up);
-    let (small, large) = (V::select(is_steep, across, up), V::select(is_steep, up, across));
-    // Beyond an eighth of a half-turn measured from the diagonal: tan(a - pi/4) = (tan a - 1) / (tan a + 1).
-    let is_wide = (large * V::constant(TAN_PI_8)).cmp_lt(small);
-    let above = V::select(is_wide, small - large, small);
-    let below = V::select(is_wide, small + large, large);
-    let below = V::select(below.cmp_eq(zero), V::constant(1.0), below);
-    let part = arctangent(above / below) + V::select(is_wide, V::constant(FRAC_PI_4), zero);
-    let part = V::select(is_steep, V::constant(FRAC_PI_2) - part, part);
-    let part = V::select(x.cmp_lt(zero), V::constant(PI) - part, part);
-    V::select(y.cmp_lt(zero), -part, part)
-}
-
-/// Arctangent of numbers up to tan(pi / 8) in absolute value: the polynomial through twelve Chebyshev nodes of
-/// atan(sqrt u) / sqrt u, within 2e-18 of it.
-#[inline(always)]
-fn arctangent<V: Lanes>(x: V) -> V {
+pub fn half_turn_of<V: Lanes>(up: V, x: V) -> V {
     let terms = [
-        1.0,
-        -0.333_333_333_333_331_2,
-        0.199_999_999_999_408_9,
-        -0.142_857_142_792_501_92,
-        0.111_111_107_449_170_34,
-        -0.090_908_968_089_881_35,
-        0.076_920_453_295_390_92,
-        -0.066_629_517_979_556_37,
-        0.058_468_781_818_920_52,
-        -0.050_351_019_300_160_78,
-        0.037_965_243_910_971_95,
-        -0.017_805_382_196_606_493,
+        0.159_154_942_639_982_1,
+        -0.053_051_556_913_169_07,
+        0.031_827_925_333_186_62,
+        -0.022_695_520_481_508_733,
+        0.017_399_361_895_010_594,
+        -0.013_289_000_021_630_19,
+        0.009_086_085_022_529_458,
+        -0.004_830_649_312_713_904,
+        0.001_669_161_220_339_215_3,
+        -0.000_270_749_624_736_473_5,
     ];
-    polynomial(x * x, &terms) * x
+    let zero = V::constant(0.0);
+    let across = x.abs();
+    let (small, large) = (across.fast_min(up), across.fast_max(up));
+    let ratio = small / V::select(large.cmp_eq(zero), V::constant(1.0), large);
+    let part = polynomial(ratio * ratio, &terms) * ratio;
+    let part = V::select(across.cmp_lt(up), V::constant(0.25) - part, part);
+    V::select(x.cmp_lt(zero), V::constant(0.5) - part, part)
 }
 
 /// The sum of `terms[k] * x^k`.
@@ -128,6 +114,8 @@ fn polynomial<V: Lanes>(x: V, terms: &[f64]) -> V {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::{FRAC_PI_4, PI, TAU};
+
     use super::*;
     use crate::lanes::{f32x16, f64x8};
 
@@ -147,18 +135,22 @@ mod tests {
         for k in -1000..=1000 {
             let x = f64::from(k) / 2000.0;
             let exact = (x * 2.0 * PI).sin();
-            assert!((sine_of_part(x) - exact).abs() < 4e-9, "{x}");
-            assert!((f64::from(sine_of_part(x as f32)) - exact).abs() < 1e-6, "{x}");
+            assert!((sine_of_part(x, 1.0) - exact).abs() < 4e-9, "{x}");
+            assert!((f64::from(sine_of_part(x as f32, 1.0)) - exact).abs() < 1e-6, "{x}");
         }
-        assert_eq!([-0.5, 0.0, 0.5].map(sine_of_part), [0.0; 3]);
+        assert_eq!([-0.5, 0.0, 0.5].map(|x| sine_of_part(x, 1.0)), [0.0; 3]);
     }
 
     #[test]
-    fn steps_of_a_unit() {
+    fn steps_of_parts() {
         for k in -5000..5000 {
             let x = f64::from(k) * 0.000_37;
-            let exact = (x * 64.0).round_ties_even() / 64.0;
-            assert_eq!((to_steps(x, 64.0), f64::from(to_steps(x as f32, 64.0))), (exact, exact), "{x}");
+            for factor in [0.5, 1.0, 4.0] {
+                let steps = (x * factor * 64.0).round_ties_even() / 64.0;
+                let exact = steps - steps.round_ties_even();
+                let found = [steps_of_part(x, factor, 64.0), f64::from(steps_of_part(x as f32, factor, 64.0))];
+                assert_eq!(found, [exact; 2], "{x} {factor}");
+            }
         }
     }
 
@@ -172,39 +164,32 @@ mod tests {
     }
 
     #[test]
-    fn angles_all_around() {
-        for k in -1000..=1000 {
+    fn angles_of_half_a_turn() {
+        for k in 0..=1000 {
             for radius in [1e-20, 0.3, 1.0, 1e12] {
-                let angle = f64::from(k) / 1000.0 * PI;
-                let (x, y) = (radius * angle.cos(), radius * angle.sin());
-                let exact = y.atan2(x);
-                assert!((angle_of(y, x) - exact).abs() < 1e-15, "{angle} {radius}");
-                let narrow = f64::from(angle_of(y as f32, x as f32));
-                let exact = f64::from(y as f32).atan2(f64::from(x as f32));
-                assert!((narrow - exact).abs() < 1e-6, "{angle} {radius}");
+                let turn = f64::from(k) / 2000.0;
+                let (x, up) = (radius * (turn * TAU).cos(), radius * (turn * TAU).sin().abs());
+                assert!((half_turn_of(up, x) - turn).abs() < 3e-10, "{turn} {radius}");
+                assert!((f64::from(half_turn_of(up as f32, x as f32)) - turn).abs() < 2e-7, "{turn} {radius}");
             }
         }
-        for (y, x, exact) in
-            [(0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, PI), (1.0, 0.0, FRAC_PI_2), (-2.0, 0.0, -FRAC_PI_2)]
-        {
-            assert_eq!(angle_of(y, x), exact);
+        for (up, x, exact) in [(0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.5), (3.0, 0.0, 0.25)] {
+            assert_eq!(half_turn_of(up, x), exact);
         }
     }
 
     #[test]
     fn vectors_give_the_bits_of_scalars() {
         let numbers: [f64; 8] = std::array::from_fn(|k| (k as f64 - 3.7) * 1.3);
-        let (x, y) = (f64x8::new(numbers), f64x8::new(numbers.map(|x| x * x - 5.0)));
-        let (sines, angles) = (sine_of_part(x).to_array(), angle_of(y, x).to_array());
+        let (x, up) = (f64x8::new(numbers), f64x8::new(numbers.map(|x| x * x)));
+        let (sines, turns) = (sine_of_part(x, 1.0).to_array(), half_turn_of(up, x).to_array());
         for k in 0..8 {
-            let (x, y) = (numbers[k], numbers[k] * numbers[k] - 5.0);
-            assert_eq!(
-                (sines[k].to_bits(), angles[k].to_bits()),
-                (sine_of_part(x).to_bits(), angle_of(y, x).to_bits())
-            );
+            let x = numbers[k];
+            let one = (sine_of_part(x, 1.0), half_turn_of(x * x, x));
+            assert_eq!((sines[k].to_bits(), turns[k].to_bits()), (one.0.to_bits(), one.1.to_bits()));
         }
         let numbers: [f32; 16] = std::array::from_fn(|k| (k as f32 - 7.7) * 0.3);
-        let sines = sine_of_part(f32x16::new(numbers)).to_array();
-        (0..16).for_each(|k| assert_eq!(sines[k].to_bits(), sine_of_part(numbers[k]).to_bits()));
+        let sines = sine_of_part(f32x16::new(numbers), 1.0).to_array();
+        (0..16).for_each(|k| assert_eq!(sines[k].to_bits(), sine_of_part(numbers[k], 1.0).to_bits()));
     }
 }

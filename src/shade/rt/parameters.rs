@@ -1,10 +1,8 @@
 //! Parameters u, v of surfaces, which patterns are functions of.
 
-use std::f64::consts::{PI, TAU};
-
 use glam::DVec3;
 
-use crate::lanes::functions::{angle_of, fraction};
+use crate::lanes::functions::{fraction, half_turn_of};
 use crate::lanes::{Lanes, Lanes3, Real, dot, each, map3, space};
 use crate::scene::assembly::PartKind;
 use crate::scene::brlcad::ARB_FACES;
@@ -23,10 +21,12 @@ const ALONG: f64 = 0.999;
 #[inline]
 pub(super) fn uv_of_direction<V: Lanes>(d: Lanes3<V>) -> [V; 2] {
     let zero = V::constant(0.0);
-    let around = angle_of(d[1], d[0]) * V::constant(1.0 / TAU);
+    let around = half_turn_of(d[1].abs(), d[0]);
     let level = d[1].mul_add(d[1], d[0] * d[0]).sqrt();
-    let up = angle_of(d[2], level).mul_add(V::constant(1.0 / PI), V::constant(0.5));
-    [V::select(around.cmp_lt(zero), around + V::constant(1.0), around), up]
+    let up = half_turn_of(d[2].abs(), level);
+    let half = V::constant(0.5);
+    let v = V::select(d[2].cmp_lt(zero), half - (up + up), half + (up + up));
+    [V::select(d[1].cmp_lt(zero), V::constant(1.0) - around, around), v]
 }
 
 /// Parameters of the surface of leaf `prim` in region `region` at points `position` with outward normals `normal`; `None`

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use crate::lanes::functions::{fraction, round, sine_of_part, to_steps};
+use crate::lanes::functions::{fraction, sine_of_part, steps_of_part};
 use crate::lanes::{Lanes, Lanes3, each, space};
 use crate::scene::brlcad::shader::Shader;
 
@@ -62,10 +62,10 @@ impl Pattern {
     }
 }
 
-/// The sine of the step nearest to so many full turns.
+/// The sine of the step nearest to `turns * factor` full turns, times `amplitude`.
 #[inline(always)]
-fn sine<V: Lanes>(turns: V) -> V {
-    sine_of_part(to_steps(turns - round(turns), SINES))
+fn sine<V: Lanes>(turns: V, factor: f64, amplitude: f64) -> V {
+    sine_of_part(steps_of_part(turns, factor, SINES), amplitude)
 }
 
 /// `x` within 0 to 1.
@@ -90,20 +90,19 @@ fn cloud<V: Lanes>(u: V, v: V) -> Lanes3<V> {
 /// Gardner's texture: four octaves of shifted sines.
 #[inline(always)]
 fn texture<V: Lanes>(x: V, y: V) -> V {
-    let number = V::constant;
     // In full turns: what is a half of pi there is a quarter here.
     let (mut fx, mut fy) = (2.0, 1.0);
-    let (mut t1, mut t2, mut c) = (number(0.0), number(0.0), 1.0);
+    let (mut t1, mut t2, mut c) = (V::constant(4.0), V::constant(4.0), 1.0);
     for _ in 0..4 {
-        let px = number(0.25) * sine(number(0.5 * fy) * y);
-        let py = number(0.25) * sine(number(0.5 * fx) * x);
-        t1 = t1 + sine(number(fx).mul_add(x, px)).mul_add(number(c), number(1.0));
-        t2 = t2 + sine(number(fy).mul_add(y, py)).mul_add(number(c), number(1.0));
+        let (px, py) = (sine(y, 0.5 * fy, 0.25), sine(x, 0.5 * fx, 0.25));
+        let along = |x: V, f: f64, p: V| sine(x.mul_add(V::constant(f), p), 1.0, 1.0);
+        t1 = along(x, fx, px).mul_add(V::constant(c), t1);
+        t2 = along(y, fy, py).mul_add(V::constant(c), t2);
         fx *= 2.0;
         fy *= 2.0;
         c *= 0.707;
     }
-    t1 * t2 * number(1.0 / 32.0)
+    t1 * t2 * V::constant(1.0 / 32.0)
 }
 
 #[cfg(test)]
@@ -117,7 +116,7 @@ mod tests {
         for i in -5000..5000 {
             let turns = f64::from(i) * 0.00123;
             let nearest = ((turns * SINES).round() * TAU / SINES).sin();
-            assert!((sine(turns) - nearest).abs() < 4e-9, "{turns}");
+            assert!((sine(turns, 1.0, 1.0) - nearest).abs() < 4e-9, "{turns}");
         }
     }
 
