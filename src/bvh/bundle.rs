@@ -78,7 +78,7 @@ impl<S: Real> Bundle<S> {
         self
     }
 
-    /// Whether all lanes look into one octant: only then is there [`Self::interval`].
+    /// Whether all lanes look into one octant.
     #[inline(always)]
     pub fn is_uniform(&self) -> bool {
         self.mixed == [false; 3]
@@ -131,13 +131,14 @@ impl<S: Real> Bundle<S> {
         from_below.fast_max(from_above)
     }
 
-    /// One child's box test for every lane of a uniform packet: no minima and maxima per axis.
+    /// One child's box test for every lane of the packet: minima and maxima only on axes where lanes look both ways.
     #[inline(always)]
     pub fn interval<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>, node: &Node<S>, slot: usize) -> Interval<V> {
         let [x, y, z] = each(|a| {
             let (near, far) = self.planes(node, a);
             let plane = |bound: S| (V::splat(bound) - packet.org[a]) * packet.rcp[a];
-            (plane(near[slot]), plane(far[slot]))
+            let (near, far) = (plane(near[slot]), plane(far[slot]));
+            if self.mixed[a] { (near.fast_min(far), near.fast_max(far)) } else { (near, far) }
         });
         Interval { near: x.0.fast_max(y.0).fast_max(z.0), far: pad(x.1.fast_min(y.1).fast_min(z.1)) }
     }

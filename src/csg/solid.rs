@@ -172,17 +172,11 @@ impl<S: Real> Solid<S> {
         stack.push((0, lanes));
         while let Some((node, lanes)) = stack.pop() {
             let node = &tree.nodes[node as usize];
-            let uniform = bundle.is_uniform();
             let mut slots = bundle.children::<V>(node, &mut near) & ((1 << node.used) - 1);
             while slots != 0 {
                 let slot = slots.trailing_zeros() as usize;
                 slots &= slots - 1;
-                let interval = if uniform {
-                    bundle.interval(packet, node, slot)
-                } else {
-                    let bounds = node.child_bounds(slot);
-                    Interval::of(packet, bounds.lo, bounds.hi)
-                };
+                let interval = bundle.interval(packet, node, slot);
                 let lanes = meets(&interval) & lanes;
                 if lanes == 0 {
                     continue;

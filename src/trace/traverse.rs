@@ -12,7 +12,6 @@ use crate::bvh::Bundle;
 use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Packet;
-use crate::ray::slab::Interval;
 use crate::scene::world::{Object, World};
 
 /// What the leaves of a tree hold.
@@ -131,10 +130,7 @@ fn tree<V, L, const ANY: bool, const COUNT: bool>(
             }
             let node = &tree.nodes[child.index as usize];
             query.count_node(lanes);
-            (child, lanes) = match bundle.is_uniform() {
-                true => children::<V, ANY, COUNT, true>(node, packet, query, &bundle, lanes),
-                false => children::<V, ANY, COUNT, false>(node, packet, query, &bundle, lanes),
-            };
+            (child, lanes) = children(node, packet, query, &bundle, lanes);
         }
     }
 }
@@ -159,7 +155,7 @@ fn lone<V, L, const ANY: bool, const COUNT: bool>(
 
 /// Tests a node's children, puts all but the nearest on the stack, returns the nearest with its lanes.
 #[inline(always)]
-fn children<V: Lanes, const ANY: bool, const COUNT: bool, const UNIFORM: bool>(
+fn children<V: Lanes, const ANY: bool, const COUNT: bool>(
     node: &Node<V::Scalar>,
     packet: &Packet<V>,
     query: &mut Query<V, ANY, COUNT>,
@@ -177,14 +173,14 @@ fn children<V: Lanes, const ANY: bool, const COUNT: bool, const UNIFORM: bool>(
     while hit != 0 {
         let slot = if ANY { 31 - hit.leading_zeros() } else { hit.trailing_zeros() } as usize & (WIDTH - 1);
         hit &= !(1 << slot);
-        let interval = if UNIFORM { bundle.interval(packet, node, slot) } else { unordered(packet, node, slot) };
+        let interval = bundle.interval(packet, node, slot);
         query.count_box();
         meets[slot] &= interval.meets(packet.t_min, query.hit.t).bits();
         if meets[slot] == 0 {
             continue;
         }
         nears[slot] = interval.near;
-        if !UNIFORM {
+        if !bundle.is_uniform() {
             keys[slot] = interval.near.lane(meets[slot].trailing_zeros() as usize);
         }
         let mut at = count;
@@ -204,10 +200,4 @@ fn children<V: Lanes, const ANY: bool, const COUNT: bool, const UNIFORM: bool>(
     }
     let slot = usize::from(order[count - 1]);
     (node.child(slot), meets[slot])
-}
-
-#[inline(always)]
-fn unordered<V: Lanes>(packet: &Packet<V>, node: &Node<V::Scalar>, slot: usize) -> Interval<V> {
-    let bounds = node.child_bounds(slot);
-    Interval::of(packet, bounds.lo, bounds.hi)
 }
