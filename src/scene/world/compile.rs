@@ -214,6 +214,10 @@ impl<S: Real> Primitives<S> {
         // Blocks of triangles are tested at once, spheres one by one: each is as dear as a node.
         let mut each = [bvh::PRIMITIVE; Class::ALL.len()];
         each[Class::WorldSphere as usize] = 1.0;
+        // Solids ask their own boxes, so a leaf of several asks one more; and what surrounds a scene makes all else in it look as
+        // if few rays came there.
+        let only_solids = self.classes.iter().all(|&class| class == Class::Solids as u8);
+        let settings = if only_solids { BuildSettings { leaf: 1, ..settings } } else { settings };
         let (tree, leaves) = bvh::build_by_cost(&self.boxes, &self.classes, &each, settings);
         let blocks = |class: Class| leaves.iter().filter(|leaf| leaf.class == class as u8).count();
         let mut object = Object {
