@@ -39,8 +39,10 @@ pub(super) struct Kinds {
     pub transmits: u32,
     /// One that sends mirrored or refracted rays on.
     pub sends: u32,
-    /// One that shows its own light, or its colour as it is.
+    /// One that shows its colour as it is.
     pub plain: u32,
+    /// A light.
+    pub shines: u32,
 }
 
 impl<S: Real> Meetings<S> {
@@ -75,9 +77,9 @@ impl<S: Real> Meetings<S> {
                 Some(pattern) => patterned(pattern, material, world, found, prims, first, same),
             };
             base = space::choose(mask, color, base);
-            if material.is_light || material.finish.is_none() {
-                kinds.plain |= same;
-            }
+            let (shines, plain) = (material.is_light, material.is_light || material.finish.is_none());
+            kinds.shines |= if shines { same } else { 0 };
+            kinds.plain |= if plain { same } else { 0 };
             let Some(finish) = &material.finish else { continue };
             finishes =
                 space::choose(mask, [finish.shine, finish.specular, finish.diffuse].map(Lanes::constant), finishes);

@@ -66,16 +66,15 @@ fn unlit<S: Real>(rt: &Rt, level: &Level<S>, found: &Found<S>, meetings: &mut Me
         let zero = S::Wide::constant(0.0);
         let facing = zero - dot(normal, dir);
         let ambient = zero.fast_max(facing) * S::Wide::constant(AMBIENT);
-        let shown = space::scale(vector(base, first), ambient);
+        let base: Lanes3<S::Wide> = vector(base, first);
+        let plain = <S::Wide as Lanes>::Mask::from_bits(kinds.plain);
+        let shown = space::choose(plain, base, space::scale(base, ambient));
         (0..3).for_each(|axis| shown[axis].store(&mut color[axis][first..]));
-        for lane in lanes_of(kinds.plain) {
+        for lane in lanes_of(kinds.shines) {
             let (i, region) = (first + lane, found.region[first + lane]);
-            let is_light = rt.materials[region as usize].is_light;
-            let lamp = rt.lamps.iter().find(|lamp| is_light && lamp.region == Some(region));
-            let seen = lamp.map(|lamp| lamp.seen(facing.lane(lane).to_f64(), found.normal(i)));
-            for axis in 0..3 {
-                color[axis][i] = seen.map_or(base[axis][i], |seen| S::from_f64(seen[axis]));
-            }
+            let Some(lamp) = rt.lamps.iter().find(|lamp| lamp.region == Some(region)) else { continue };
+            let seen = lamp.seen(facing.lane(lane).to_f64(), found.normal(i));
+            (0..3).for_each(|axis| color[axis][i] = S::from_f64(seen[axis]));
         }
     }
 }
@@ -163,7 +162,10 @@ fn mirror<S: Real>(
     let regions = &found.region[first..];
     let is_far = S::Wide::constant(glass::AIR_GAP).cmp_le(S::Wide::load(&found.t[first..])).bits();
     let may_go_on = |lane: &usize| level.carry(first + lane).level <= MAX_BOUNCES;
-    let plain = lanes_of(lanes & is_far).filter(may_go_on).fold(0u32, |plain, lane| plain | 1 << lane);
+    let plain = match level.is_primary() {
+        true => lanes & is_far,
+        false => lanes_of(lanes & is_far).filter(may_go_on).fold(0u32, |plain, lane| plain | 1 << lane),
+    };
     let (mut rest, mut done) = (plain, 0);
     while rest != 0 {
         let region = regions[rest.trailing_zeros() as usize % MAX_LANES];
