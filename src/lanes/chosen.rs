@@ -32,6 +32,14 @@ pub fn positions_in<V: Lanes>(list: &[u32], wanted: u32) -> u32 {
     }
 }
 
+/// Whether each number of `list` is one more than that before it.
+#[inline(always)]
+pub fn is_run(list: &[u32]) -> bool {
+    let first = list.first().copied().unwrap_or_default();
+    // All of them, without a way out: that is one comparison of vectors.
+    list.iter().enumerate().fold(true, |run, (k, &x)| run & (x == first.wrapping_add(k as u32)))
+}
+
 /// The words of `list` in `lanes`, each with those of the lanes that have it.
 #[inline(always)]
 pub fn groups(list: &[u32; MAX_LANES], lanes: u32) -> impl Iterator<Item = (u32, u32)> {
@@ -170,6 +178,8 @@ impl Chosen {
     pub fn extend(&self, from: &[u32], to: &mut Vec<u32>) {
         let mut words = [0; MAX_LANES];
         match from.first_chunk::<MAX_LANES>() {
+            // The first ones: they stay where they are.
+            Some(from) if self.bits & (self.bits + 1) == 0 => words = *from,
             Some(from) => {
                 words.iter_mut().zip(self.list).for_each(|(word, lane)| *word = from[usize::from(lane) % MAX_LANES])
             }

@@ -1,9 +1,10 @@
 //! Rays that leave the points of one level, with what they carry, and shadow rays with the light that they ask for.
 
 use glam::DVec3;
+use wide::u8x16;
 
 use super::colors::Colors;
-use crate::lanes::chosen::{Chosen, at, lanes_of, spill};
+use crate::lanes::chosen::{Chosen, at, is_run, lanes_of, spill};
 use crate::lanes::{Column, Lanes, Lanes3, MAX_LANES, Real, each};
 use crate::ray::Rays;
 
@@ -75,9 +76,71 @@ impl<S: Real> Branches<S> {
         }
     }
 
+    /// Adds what the rays carry, each with a weight of its own, that are not `occluded` to their samples in `out`.
+    pub fn arrive(&self, occluded: &[u8], out: &mut Colors) {
+        for first in (0..self.len()).step_by(S::Wide::N) {
+            let path = &self.path[first..self.len().min(first + S::Wide::N)];
+            let lanes = clear(&occluded[first..]) & (u32::MAX >> (32 - path.len()));
+            if path.len() == S::Wide::N && is_run(path) {
+                let light: Lanes3<S::Wide> = each(|axis| S::Wide::load(&self.weight[axis][first..]));
+                out.add_lanes(path[0] as usize, lanes, light);
+                continue;
+            }
+            for lane in lanes_of(lanes) {
+                out.add(path[lane] as usize, self.weight_of(first + lane));
+            }
+        }
+    }
+
     /// What ray `i` carries, which has a weight of its own.
     #[inline]
     pub fn weight_of(&self, i: usize) -> DVec3 {
         DVec3::from(each(|axis| self.weight[axis][i].to_f64()))
+    }
+}
+
+/// Which of the first bytes are zero, of [`MAX_LANES`] at most.
+#[inline(always)]
+fn clear(bytes: &[u8]) -> u32 {
+    match bytes.first_chunk::<MAX_LANES>() {
+        Some(bytes) => u8x16::new(*bytes).simd_eq(u8x16::ZERO).to_bitmask(),
+        None => bytes.iter().rev().fold(0, |bits, &byte| bits << 1 | u32::from(byte == 0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+
+    /// Light arrives at the sample of each ray that is not occluded, wherever samples follow each other and where they do not.
+    fn light_arrives_as_ray_by_ray<S: Real>() {
+        let mut random = Random(3);
+        let samples = 8 * MAX_LANES;
+        let path: Vec<u32> = (0..2 * samples as u32).collect();
+        let (mut branches, mut out, mut expected) = (Branches::<S>::default(), Colors::default(), Colors::default());
+        branches.open(samples);
+        [&mut out, &mut expected].into_iter().for_each(|colors| colors.open(samples));
+        let mut whole = 0;
+        for first in (0..samples).step_by(S::Wide::N) {
+            let lanes =
+                if random.unit() < 0.5 { S::Wide::ALL } else { (random.unit() * 65536.0) as u32 & S::Wide::ALL };
+            whole += usize::from(lanes == S::Wide::ALL);
+            let weight = each(|_| S::Wide::constant(random.unit()));
+            branches.push(lanes, &path[first..], [weight; 3], S::INFINITY);
+        }
+        branches.close();
+        let occluded: Vec<u8> = (0..branches.len()).map(|_| u8::from(random.unit() < 0.3)).collect();
+        branches.arrive(&occluded, &mut out);
+        for i in (0..branches.len()).filter(|i| occluded[*i] == 0) {
+            expected.add(branches.path[i] as usize, branches.weight_of(i));
+        }
+        assert!(whole > 0 && out.channels() == expected.channels());
+    }
+
+    #[test]
+    fn light_arrives_as_ray_by_ray_in_either_precision() {
+        light_arrives_as_ray_by_ray::<f32>();
+        light_arrives_as_ray_by_ray::<f64>();
     }
 }

@@ -262,6 +262,19 @@ impl<'a, S: Real> Shader<'a, S> {
         work.clock.shadowing += clock.elapsed();
     }
 
+    /// Whether each of `rays` is occluded, into `work.occluded`; false, and nothing done, where something may let a part of the light
+    /// pass.
+    pub(super) fn occlude_wholly(&self, rays: &Rays<S>, work: &mut Workspace<S>) -> bool {
+        if !self.through().is_opaque(true) {
+            return false;
+        }
+        let clock = Instant::now();
+        let counters = self.settings.count.then_some(&mut work.counters);
+        self.engine.occluded(self.world, rays, &mut work.occluded, &mut work.scratch, counters);
+        work.clock.shadowing += clock.elapsed();
+        true
+    }
+
     fn through(&self) -> Through<'_, S> {
         Through { world: self.world, engine: self.engine, looks: &self.looks }
     }

@@ -73,6 +73,11 @@ impl<S: Real> Through<'_, S> {
         }
     }
 
+    /// Whether surfaces stop all light that meets them; `glass`: see [`Self::shadows`].
+    pub fn is_opaque(&self, glass: bool) -> bool {
+        !(self.looks.has_holes || glass && self.looks.has_glass)
+    }
+
     /// Calls `lit` with the number of each of `rays` along which some light is left, and its share: 1 without any surface
     /// in between. With `glass`, panes and bodies of glass let light pass straight on, weakened by their tint and
     /// Fresnel's term; else they stop it.
@@ -88,7 +93,7 @@ impl<S: Real> Through<'_, S> {
         counters: Option<&mut Counters>,
         mut lit: impl FnMut(usize, DVec3),
     ) {
-        if !(self.looks.has_holes || glass && self.looks.has_glass) {
+        if self.is_opaque(glass) {
             self.engine.occluded(self.world, rays, occluded, scratch, counters);
             occluded.iter().enumerate().filter(|(_, occluded)| **occluded == 0).for_each(|(i, _)| lit(i, DVec3::ONE));
             return;

@@ -145,6 +145,9 @@ impl<S: Real> Shader<'_, S> {
             return;
         }
         work.rays.shadow += shadows.rays.live_count() as u64;
+        if self.occlude_wholly(&shadows.rays, work) {
+            return shadows.arrive(&work.occluded, out);
+        }
         self.occlude(&shadows.rays, work, true, |i, left| {
             out.add(shadows.path[i] as usize, shadows.weight_of(i) * left);
         });

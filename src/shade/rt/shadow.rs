@@ -2,7 +2,7 @@
 
 use super::level::{Found, start, vector};
 use super::{Rt, TOLERANCE};
-use crate::lanes::chosen::{Chosen, lanes_of};
+use crate::lanes::chosen::{Chosen, is_run, lanes_of};
 use crate::lanes::words::positions;
 use crate::lanes::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real};
 use crate::ray::Rays;
@@ -145,13 +145,25 @@ fn simple_verdicts<S: Real>(
         rest &= !same;
         let material = &rt.materials[region as usize];
         if material.is_light {
-            lanes_of(same).for_each(|lane| visible[slots[lane] as usize] = S::ONE);
+            arrive::<S>(same, &slots[..S::Wide::N], visible);
         }
         if material.is_light || material.finish.is_none_or(|finish| finish.transmit <= 0.0) {
             simple |= same;
         }
     }
     simple
+}
+
+/// All of the light arrives at `slots` of `lanes`.
+#[inline(always)]
+fn arrive<S: Real>(lanes: u32, slots: &[u32], visible: &mut [S]) {
+    let place = slots[0] as usize;
+    let together = visible.get_mut(place..place + S::Wide::N).filter(|_| is_run(slots));
+    let Some(visible) = together else {
+        return lanes_of(lanes).for_each(|lane| visible[slots[lane] as usize] = S::ONE);
+    };
+    let before = S::Wide::load(visible);
+    S::Wide::select(<S::Wide as Lanes>::Mask::from_bits(lanes), S::Wide::constant(1.0), before).store(visible);
 }
 
 fn judge<S: Real>(rt: &Rt, passed: Passed, i: usize, found: &Found<S>) -> Verdict {
