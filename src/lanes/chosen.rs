@@ -2,7 +2,7 @@
 
 use super::words::{list_bits, positions};
 use super::{Column, LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, f32x16};
-use wide::u32x8;
+use wide::{u8x16, u32x8};
 
 /// The numbers of the set bits of `bits`, in order.
 #[inline(always)]
@@ -29,6 +29,15 @@ pub fn positions_in<V: Lanes>(list: &[u32], wanted: u32) -> u32 {
         (16, Some(list), _) => positions(list, wanted),
         (8, _, Some(list)) => u32x8::new(*list).simd_eq(u32x8::splat(wanted)).to_bitmask(),
         _ => list.iter().take(V::N).rev().fold(0, |bits, &word| bits << 1 | u32::from(word == wanted)),
+    }
+}
+
+/// Which of the first 16 bytes, or of all, are zero.
+#[inline(always)]
+pub fn zeros(bytes: &[u8]) -> u32 {
+    match bytes.first_chunk::<16>() {
+        Some(bytes) => u8x16::new(*bytes).simd_eq(u8x16::ZERO).to_bitmask(),
+        None => bytes.iter().rev().fold(0, |bits, &byte| bits << 1 | u32::from(byte == 0)),
     }
 }
 
@@ -281,6 +290,13 @@ mod tests {
         let found: Vec<_> = groups(&list, 0b0111_0110).collect();
         assert_eq!(found, [(3, 0b10_0010), (7, 0b101_0100)]);
         assert_eq!(groups(&list, 0).next(), None);
+    }
+
+    #[test]
+    fn zeros_and_runs() {
+        let bytes: [u8; 20] = std::array::from_fn(|i| [0, 1, 255][i % 3]);
+        assert_eq!((zeros(&bytes), zeros(&bytes[1..6]), zeros(&[])), (0b1001_0010_0100_1001, 0b100, 0));
+        assert!(is_run(&[]) && is_run(&[9]) && is_run(&[4, 5, 6, 7]) && !is_run(&[4, 5, 7, 6]) && !is_run(&[4, 4]));
     }
 
     #[test]

@@ -55,8 +55,8 @@ pub fn steps_of_part<V: Lanes>(x: V, factor: f64, steps: f64) -> V {
     scaled - ((scaled + further) - further)
 }
 
-/// `amplitude` times the sine of `x` full turns, half a turn at most. Within 4e-9 of `amplitude`, beside roundings: the polynomial through six Chebyshev nodes of
-/// sin(2 pi sqrt u) / (sqrt u (1/4 - u)), so that zeros are exact.
+/// `amplitude` times the sine of `x` full turns, half a turn at most. Within 4e-9 of `amplitude`, beside roundings: the polynomial
+/// through six Chebyshev nodes of sin(2 pi sqrt u) / (sqrt u (1/4 - u)), so that zeros are exact.
 #[inline(always)]
 pub fn sine_of_part<V: Lanes>(x: V, amplitude: f64) -> V {
     let terms = [

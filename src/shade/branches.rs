@@ -1,10 +1,9 @@
 //! Rays that leave the points of one level, with what they carry, and shadow rays with the light that they ask for.
 
 use glam::DVec3;
-use wide::u8x16;
 
 use super::colors::Colors;
-use crate::lanes::chosen::{Chosen, at, is_run, lanes_of, spill};
+use crate::lanes::chosen::{Chosen, at, is_run, lanes_of, spill, zeros};
 use crate::lanes::{Column, Lanes, Lanes3, MAX_LANES, Real, each};
 use crate::ray::Rays;
 
@@ -80,7 +79,7 @@ impl<S: Real> Branches<S> {
     pub fn arrive(&self, occluded: &[u8], out: &mut Colors) {
         for first in (0..self.len()).step_by(S::Wide::N) {
             let path = &self.path[first..self.len().min(first + S::Wide::N)];
-            let lanes = clear(&occluded[first..]) & (u32::MAX >> (32 - path.len()));
+            let lanes = zeros(&occluded[first..]) & (u32::MAX >> (32 - path.len()));
             if path.len() == S::Wide::N && is_run(path) {
                 let light: Lanes3<S::Wide> = each(|axis| S::Wide::load(&self.weight[axis][first..]));
                 out.add_lanes(path[0] as usize, lanes, light);
@@ -96,15 +95,6 @@ impl<S: Real> Branches<S> {
     #[inline]
     pub fn weight_of(&self, i: usize) -> DVec3 {
         DVec3::from(each(|axis| self.weight[axis][i].to_f64()))
-    }
-}
-
-/// Which of the first bytes are zero, of [`MAX_LANES`] at most.
-#[inline(always)]
-fn clear(bytes: &[u8]) -> u32 {
-    match bytes.first_chunk::<MAX_LANES>() {
-        Some(bytes) => u8x16::new(*bytes).simd_eq(u8x16::ZERO).to_bitmask(),
-        None => bytes.iter().rev().fold(0, |bits, &byte| bits << 1 | u32::from(byte == 0)),
     }
 }
 
