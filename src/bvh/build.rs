@@ -23,7 +23,7 @@ pub enum Preset {
 pub struct BuildSettings {
     /// Time it may take.
     pub preset: Preset,
-    /// Most primitives in a leaf, 1 to [`LEAF_PRIMS`].
+    /// Most primitives in a leaf, 1 to [`LEAF_PRIMS`]. Worlds have objects of solids only with one, whatever this says.
     pub leaf: usize,
 }
 
