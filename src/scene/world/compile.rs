@@ -8,12 +8,12 @@ use rayon::prelude::*;
 use super::facets::Facets;
 use super::rounding::Rounding;
 use super::runs::Runs;
-use super::{Class, Counts, Instance, Kinds, Object, PlacedSolid, SolidBlock, World, solids, successor};
-use crate::bvh::{self, BuildSettings, LEAF_PRIMS, Leaf, Preset, Tree};
+use super::{Class, Counts, Kinds, Object, PlacedSolid, SolidBlock, World, instances, solids, successor};
+use crate::bvh::{self, BuildSettings, LEAF_PRIMS, Leaf, Preset};
 use crate::error::Result;
 use crate::lanes::Real;
-use crate::math::{Aabb, Affine, transformed_bounds};
-use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind, Placement};
+use crate::math::Aabb;
+use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind};
 use crate::scene::description::{Description, Shape};
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::flat::FlatTree;
@@ -57,8 +57,8 @@ impl<S: Real> World<S> {
             objects.push(built);
             counts.push(count);
         }
-        let instances: Vec<_> = assembly.placements.iter().map(|p| instance(p, &objects)).collect();
-        let (top, top_leaves, unbounded_instances) = upper_tree(&instances, settings.preset);
+        let instances = instances::all(&assembly.placements, &objects);
+        let (top, top_leaves, unbounded_instances) = instances::upper_tree(&instances, settings.preset);
         let runs: Vec<Runs> = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
         let facets = assembly.objects.iter().zip(&runs).map(|(o, runs)| Facets::new(o, runs)).collect();
         let rounding = Rounding::of(&assembly.placements, &objects);
@@ -299,43 +299,4 @@ fn world_sphere<S: Real>(m: &DAffine3) -> Option<SphereRecord<S>> {
         alike(y.length_squared()) && alike(z.length_squared()) && right(x.dot(y)) && right(y.dot(z)) && right(z.dot(x));
     let numbers = [m.translation.x, m.translation.y, m.translation.z, square.sqrt()].map(S::from_f64);
     (round && numbers.iter().all(|n| n.is_finite()) && numbers[3] > S::ZERO).then_some(numbers)
-}
-
-fn instance<S: Real>(placement: &Placement, objects: &[Object<S>]) -> Instance<S> {
-    let bounds = objects[placement.object as usize].bounds();
-    let m = &placement.to_world;
-    let identity = *m == DAffine3::IDENTITY;
-    let to_local = Affine::from_f64(&m.inverse());
-    let world = if identity || bounds.is_empty() {
-        bounds
-    } else if bounds.is_bounded() {
-        let (lo, hi) = bounds.to_f64();
-        let (world_lo, world_hi) = transformed_bounds(m, lo, hi);
-        // The map's rounding moves a hit by some ulps of the numbers that are added up on the way.
-        let reach = transformed_bounds(&DAffine3 { matrix3: m.matrix3, translation: DVec3::ZERO }, lo, hi);
-        let size = reach.0.abs().max(reach.1.abs()).max(m.translation.abs()).max_element();
-        let slack = DVec3::splat(32.0 * S::EPSILON.to_f64() * size);
-        Aabb::enclosing(world_lo - slack, world_hi + slack)
-    } else {
-        Aabb::EVERYTHING
-    };
-    Instance { object: placement.object, identity, to_local, bounds: world }
-}
-
-type UpperTree<S> = (Tree<S>, Vec<u32>, Vec<u32>);
-
-fn upper_tree<S: Real>(instances: &[Instance<S>], preset: Preset) -> UpperTree<S> {
-    let bounded = |i: &u32| instances[*i as usize].bounds.is_bounded();
-    let present = (0..instances.len() as u32).filter(|&i| !instances[i as usize].bounds.is_empty());
-    let (ids, unbounded): (Vec<u32>, Vec<u32>) = present.partition(bounded);
-    if let [only] = instances
-        && only.identity
-    {
-        return (Tree::empty(), Vec::new(), unbounded);
-    }
-    let boxes: Vec<_> = ids.iter().map(|&i| instances[i as usize].bounds).collect();
-    // To enter an instance costs more than to open a node: each has a box of its own among eight.
-    let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], BuildSettings { preset, leaf: 1 });
-    let leaves = leaves.iter().flat_map(|leaf| &leaf.prims).map(|&p| ids[p as usize]).collect();
-    (tree, leaves, unbounded)
 }

@@ -5,6 +5,7 @@
 
 mod compile;
 mod facets;
+mod instances;
 mod rounding;
 mod runs;
 mod solids;
