@@ -77,7 +77,8 @@ pub fn instance<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
 }
 
-fn object<V: Lanes, const ANY: bool, const COUNT: bool>(
+/// Traces a packet through an object, in the object's space.
+pub fn object<V: Lanes, const ANY: bool, const COUNT: bool>(
     object: &Object<V::Scalar>,
     inst: u32,
     packet: &Packet<V>,

@@ -5,8 +5,8 @@
 //! triangles are set up once per tile, and a ray's share of a triangle test is four linear functions of its two
 //! coordinates. `tile` answers with that arithmetic ([`own`]; [`batch`] states its accuracy). In `tile-exact` the common
 //! formula decides where rounding could matter, so its hits are those of the other engines, bit by bit ([`exact`]).
-//! Instances are entered by taking the tile's frame through their maps ([`place`]); shapes in them are tested ray by ray
-//! ([`shapes`]). To the stream kernel ([`super::stream`]) go blocks of rays without a common point, and worlds with solids,
+//! Instances are entered by taking the tile's frame through their maps ([`place`]), or, where their triangles are finer than
+//! the rays, group by group as packets ([`packets`]); shapes in them are tested ray by ray ([`shapes`]). To the stream kernel ([`super::stream`]) go blocks of rays without a common point, and worlds with solids,
 //! with more shapes than triangles, or with maps too flat for f32; for `tile-exact` also all worlds with instances. Single
 //! odd rays go to the packet kernel.
 //!
@@ -24,6 +24,7 @@ mod groups;
 mod mirror;
 mod node;
 mod own;
+mod packets;
 mod pairs;
 mod place;
 mod presumed;
@@ -81,10 +82,8 @@ pub struct Memory {
     pairs: pairs::Pairs,
     slabs: slab::Slabs,
     levels: Vec<node::Level>,
-    /// For leaves of shapes.
+    /// For shapes, and for instances that packets are taken through.
     stack: Stack<f32>,
-    /// What instances that are seen small may still cost a tile before it gives up.
-    credit: u32,
     /// Where groups start that are for the stream kernel.
     rest: Vec<usize>,
     /// Single rays that are.
@@ -157,6 +156,7 @@ impl<'a> Job<'a> {
     ) -> Self {
         let Scratch { single: super::Memory { stack, stream }, tile: memory, .. } = scratch;
         stack.reserve(world.stack_bound());
+        memory.stack.reserve(world.stack_bound());
         Self { world, rays, memory, stack, stream, counters, output, most, past: rays.len() > MANY }
     }
 
@@ -311,11 +311,7 @@ impl<'a> Job<'a> {
             return false;
         }
         let exact = Exact { bundle, world: self.world, object: self.world.first_object() };
-        if !walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters) {
-            let starts = (0..N * SET).filter(|g| groups >> g & 1 != 0).map(|g| bundle.first + g * V::N);
-            self.memory.rest.extend(starts);
-            return true;
-        }
+        walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
             if !self.past {
                 self.output.prefetch(bundle.first + (g + bundle::AHEAD) * V::N);

@@ -15,10 +15,13 @@ use crate::scene::world::Object;
 use crate::trace::leaf;
 use crate::trace::query::{Query, Stack};
 
-/// The rays of a group in the space of an instance, their ends, and the lanes that are traced and meet its box.
+/// The rays of a group in the space of an instance, their ends or `limit`, whichever is nearer, and the lanes that are traced
+/// and meet its box.
 #[inline(always)]
-pub fn enter(exact: &Exact, inst: u32, g: usize) -> (Packet<V>, V, u32) {
+pub fn enter(exact: &Exact, inst: u32, g: usize, limit: V) -> (Packet<V>, V, u32) {
     let (packet, t_max) = exact.bundle.packet(g);
+    // What is no number limits nothing.
+    let t_max = limit.fast_min(t_max);
     let (instance, tame) = (&exact.world.instances[inst as usize], exact.bundle.tame[g]);
     if instance.identity {
         return (packet, t_max, tame);
@@ -43,7 +46,7 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
     while rest != 0 {
         let g = rest.trailing_zeros() as usize & (GROUPS - 1);
         rest &= rest - 1;
-        let (packet, t_max, lanes) = enter(exact, inst, g);
+        let (packet, t_max, lanes) = enter(exact, inst, g, V::splat(f32::INFINITY));
         let lanes = lanes & !groups.done(g, lanes);
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), stack, counters);
         leaf::block(object, inst, &packet, &mut query, leaf, lanes);
@@ -60,7 +63,7 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
 }
 
 /// Keeps the hits of a packet where they are a group's nearest; whether any is.
-fn take(groups: &mut Groups, g: usize, hit: &HitPacket<V>, inst: u32) -> bool {
+pub fn take(groups: &mut Groups, g: usize, hit: &HitPacket<V>, inst: u32) -> bool {
     let inverse = (groups.of[g].slowness / hit.t).fast_min(V::splat(f32::MAX));
     let mut rest = !positions(&hit.prim, INVALID_ID) & V::ALL;
     let mut any = false;

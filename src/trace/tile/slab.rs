@@ -82,6 +82,12 @@ impl Slabs {
         self.score > 0 && groups.count_ones() <= MOST[usize::from(ANY)]
     }
 
+    /// Whether tests have paid lately.
+    #[inline(always)]
+    pub fn pay(&self) -> bool {
+        self.score > 0
+    }
+
     /// `pairs` of triangles and groups were tested, `found` of them gave something.
     #[inline(always)]
     pub fn learn(&mut self, pairs: usize, found: usize) {

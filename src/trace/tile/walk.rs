@@ -4,11 +4,12 @@
 use super::batch::BATCH;
 use super::exact::Exact;
 use super::node::{self, Level, Planes, key};
+use super::packets;
 use super::pairs::flush;
 use super::place::{self, Place};
 use super::shapes;
 use super::slab::Space;
-use super::{HALF_ULP, Memory, SET, V};
+use super::{GROUPS, HALF_ULP, Memory, SET, V};
 use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::Lanes;
 use crate::lanes::words::{least_key, prefetch};
@@ -29,8 +30,9 @@ struct View<'a> {
 trait Leaves<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> {
     /// Asks the memory for what a leaf refers to.
     fn fetch(&self, leaf: Child);
-    /// Whether a leaf is dear enough for a test of its box against single rays.
-    fn is_dear(&self, leaf: Child) -> bool;
+    /// Whether a leaf that `groups` met is dear enough for a test of its box against single rays; `pays`: such tests have paid
+    /// lately.
+    fn is_dear(&self, leaf: Child, groups: u64, pays: bool) -> bool;
     /// Visits a leaf with some groups.
     fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters);
 }
@@ -44,24 +46,22 @@ struct Blocks<'a> {
 /// Instances.
 struct Instances<'a>(&'a World<f32>);
 
-/// Triangles per ray from which on an instance is seen so small that its triangles have few rays in common: the stream
-/// kernel is the faster one.
-const FINE: f32 = 24.0;
+/// Triangles per ray from which on an instance is seen so small that its triangles have few rays in common: packets are the
+/// faster way through it.
+const FINE: f32 = 4.0;
 
-/// What a visit of such an instance takes from a tile's credit; others add the groups that meet them.
-const COST: u32 = 8;
+/// Groups up to which the box of an instance is tested against their single rays in any case: to enter it costs several times as
+/// much.
+const FEW: u32 = GROUPS as u32 / 2;
 
-/// Credit of a tile at its start, and at most. One without credit gives up.
-const CREDIT: [u32; 2] = [16, 64];
-
-/// Traces the `N` sets that are loaded in `memory` through the world. False if it gave up.
+/// Traces the `N` sets that are loaded in `memory` through the world.
 #[inline(always)]
 pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     memory: &mut Memory,
     exact: &Exact,
     groups: u64,
     counters: &mut Counters,
-) -> bool {
+) {
     memory.batch.clear();
     memory.slabs.start();
     let frame = &memory.groups.frame;
@@ -71,11 +71,7 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
         let margin = place::margin(exact.world, frame);
         let planes = Planes::of(&memory.groups, frame, margin);
         let view = View { tree: &exact.world.top, planes, space: space(margin), first: 0 };
-        memory.credit = CREDIT[0];
         descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &Instances(exact.world), groups, counters);
-        if memory.credit == 0 {
-            return false;
-        }
     } else {
         let margin = node::MARGIN * HALF_ULP * frame.extent;
         let planes = Planes::of(&memory.groups, frame, margin);
@@ -86,7 +82,6 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
     if memory.batch.len() > 0 {
         flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
     }
-    true
 }
 
 /// Takes some groups through a tree.
@@ -120,7 +115,7 @@ fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool
         let mut met = level.groups_at::<N>(slot, &memory.groups);
         let node = &tree.nodes[level.node as usize];
         let child = node.child(slot);
-        if met != 0 && (memory.slabs.wanted::<ANY>(met) || leaves.is_dear(child)) {
+        if met != 0 && (memory.slabs.wanted::<ANY>(met) || leaves.is_dear(child, met, memory.slabs.pay())) {
             met = memory.slabs.test(&memory.groups, exact.bundle, &view.space, &node.child_bounds(slot), met);
         }
         if met == 0 {
@@ -196,7 +191,7 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
     }
 
     #[inline(always)]
-    fn is_dear(&self, leaf: Child) -> bool {
+    fn is_dear(&self, leaf: Child, _groups: u64, _pays: bool) -> bool {
         !EXACT && is_of_shapes(leaf)
     }
 
@@ -235,8 +230,8 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
     }
 
     #[inline(always)]
-    fn is_dear(&self, _leaf: Child) -> bool {
-        false
+    fn is_dear(&self, leaf: Child, groups: u64, pays: bool) -> bool {
+        leaf.is_leaf() && (groups.count_ones() <= FEW || pays)
     }
 
     #[inline(always)]
@@ -245,14 +240,10 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
         let inst = world.top_leaves[leaf.index as usize];
         let Instance { object, bounds, .. } = &world.instances[inst as usize];
         let triangles = (world.objects[*object as usize].triangles.len() * BLOCK) as f32;
-        memory.credit = match triangles <= FINE * memory.groups.rays_on::<N>(bounds) {
-            true => (memory.credit + groups.count_ones()).min(CREDIT[1]),
-            false => memory.credit.saturating_sub(COST),
-        };
-        if memory.credit == 0 {
-            // Nothing is wanted any more: the way ends here.
-            memory.groups.farthest = f32::NEG_INFINITY;
-            return;
+        // What the tile and the instance alone say: answers must not depend on what was learnt or found before.
+        if triangles > FINE * memory.groups.rays_on::<N>(bounds) {
+            let Memory { groups: state, stack, .. } = memory;
+            return packets::visit::<N, ANY, COUNT>(state, exact, inst, groups, stack, counters);
         }
         let state = &memory.groups;
         let place = Place::new(world, inst, &state.frame);
