@@ -39,6 +39,9 @@ pub(super) struct Operands<S> {
     pub leaving: u32,
     /// Lanes that are to be swept instead.
     pub together: u32,
+    /// After a search: lanes that have left an operand that is needed before they come to a boundary. However far the search went,
+    /// they meet none.
+    pub through: u32,
 }
 
 impl<S: Real> Operands<S> {
@@ -92,7 +95,8 @@ impl<S: Real> Operands<S> {
         solid.meet(packet, lanes, eps, reach, search);
         let effort = Effort { met: search.met.len(), ..Effort::default() };
         let is_needed = |met: &Met| operation.operands[met.leaf as usize].is_needed;
-        let (mut place, mut last) = (earliest, limit);
+        let (mut place, mut last, mut exit) = (earliest, limit, V::splat(S::INFINITY));
+        self.through = 0;
         let mut needed = 0;
         for met in search.met.iter().filter(|met| is_needed(met)) {
             let within = search.intervals.get::<V>(met.at);
@@ -101,7 +105,8 @@ impl<S: Real> Operands<S> {
                 return (effort, lanes);
             }
             let [begin, end, ..] = &self.spans[self.count - 1];
-            (place, last) = (place.fast_max(V::load(begin)), last.fast_min(V::load(end)));
+            let end = V::load(end);
+            (place, last, exit) = (place.fast_max(V::load(begin)), last.fast_min(end), exit.fast_min(end));
             needed += 1;
         }
         if needed != operation.needed {
@@ -136,6 +141,7 @@ impl<S: Real> Operands<S> {
                 }
             }
         }
+        self.through = lanes & exit.cmp_lt(place).bits();
         // Lanes that begin inside of all meet whatever comes.
         let free = lanes & place.cmp_le(earliest).bits();
         for met in search.met.iter_mut().filter(|met| met.operand == Met::UNSEEN && met.lanes & free != 0) {

@@ -122,6 +122,7 @@ pub fn sweep<V: Lanes>(
             let Scratch { search, operands, .. } = scratch;
             let (direct, left) = direct::first(solid, operation, part, Some(search), operands, &mut found);
             (effort, rest) = (effort + direct, left);
+            lanes &= !(operands.through & !rest);
         }
         if rest != 0 {
             effort = effort + pass(solid, Part { lanes: rest, ..part }, scratch, &mut found);
