@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::error::{Error, Result};
-use crate::measure::agreement::{Agreement, compare};
+use crate::measure::agreement::{Agreement, compare_traced};
 use crate::measure::answers::Answers;
 use crate::measure::explain::{self, Costs, Limit};
 use crate::measure::eye::{Framing, View};
@@ -224,7 +224,7 @@ impl<S: Engines> Subject<'_, S> {
     fn admit_peer(&self, peer: &dyn Peer<S>, batches: &[Rays<S>], scalar: &Answers<S>) -> Admission<S> {
         let mut answers = scalar.clone();
         self.workers.peer_pass(peer, batches, &mut answers);
-        let agreement = compare(scalar, &answers);
+        let agreement = compare_traced(batches, scalar, &answers);
         match &agreement.first {
             Some(first) if !agreement.passes() => {
                 let (count, rays) = (agreement.differences, agreement.rays);
