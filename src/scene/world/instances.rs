@@ -40,7 +40,9 @@ impl Cover {
                 open.extend(children(child.index as usize));
             }
         }
-        Self(boxes.iter().map(Aabb::to_f64).map(|(lo, hi)| [0.5 * (lo + hi), 0.5 * (hi - lo)]).collect())
+        // Halves first: sums of the largest numbers would be infinite.
+        let halves = |(lo, hi): (DVec3, DVec3)| [0.5 * lo + 0.5 * hi, 0.5 * hi - 0.5 * lo];
+        Self(boxes.iter().map(Aabb::to_f64).map(halves).collect())
     }
 
     /// The box of its image.
@@ -57,7 +59,7 @@ impl Cover {
 
 /// The instances of some placements.
 pub fn all<S: Real>(placements: &[Placement], objects: &[Object<S>]) -> Vec<Instance<S>> {
-    let covers: Vec<Cover> = objects.iter().map(Cover::of).collect();
+    let covers: Vec<Cover> = objects.par_iter().map(Cover::of).collect();
     let one = |placement: &Placement| instance(placement, objects, &covers);
     placements.par_iter().with_min_len(256).map(one).collect()
 }
