@@ -109,7 +109,7 @@ impl<S: Real> Chunk<S> {
     /// Takes at most [`RAYS`] rays from a batch, which is not empty; the ends of their segments go to `t`.
     #[inline(always)]
     pub fn gather<V: Lanes<Scalar = S>>(&mut self, rays: &Rays<S>, ids: &[u32], t: &mut [S; RAYS]) {
-        (self.len, self.flat, self.steep) = (ids.len().min(RAYS), false, false);
+        self.start(ids.len());
         // Columns of one known length, so that a ray's number is looked at once instead of eight times.
         let n = rays.padded_len();
         let [ox, oy, oz] = each(|a| &rays.org[a][..n]);
@@ -134,7 +134,7 @@ impl<S: Real> Chunk<S> {
             self.put(at, &Packet::new(org, dir, V::load(&self.t_min[at..])));
         }
         self.bounds = Some(Bounds::of::<V>(self, t));
-        self.mean = self.sum_of_directions::<V>();
+        self.finish::<V>();
     }
 
     /// The rays of `from` that meet an instance's box before `t`, in its space and at the same places. Returns which.
@@ -146,7 +146,7 @@ impl<S: Real> Chunk<S> {
         t: &[S; RAYS],
         rays: Set,
     ) -> Set {
-        (self.len, self.bounds, self.flat, self.steep) = (from.len, None, false, false);
+        self.start(from.len);
         let mut inside = 0;
         if rays.count_ones() <= FEW {
             let mut rest = rays;
@@ -159,7 +159,7 @@ impl<S: Real> Chunk<S> {
             for at in (0..self.len).step_by(V::N) {
                 inside |= self.enter_vector::<V>(from, instance, t, at, (rays >> at) as u32 & V::ALL);
             }
-            self.mean = self.sum_of_directions::<V>();
+            self.finish::<V>();
         }
         inside
     }
@@ -182,12 +182,29 @@ impl<S: Real> Chunk<S> {
         if meets == 0 {
             return 0;
         }
-        let local = packet.into_local(&instance.to_local, interval.near);
-        store3(local.org, &mut self.org, at);
-        store3(local.dir, &mut self.dir, at);
-        local.t_min.store(&mut self.t_min[at..]);
-        self.put(at, &local);
+        self.take(at, &packet.into_local(&instance.to_local, interval.near));
         Set::from(meets) << at
+    }
+
+    /// Starts anew, with `len` rays to come.
+    #[inline(always)]
+    pub fn start(&mut self, len: usize) {
+        (self.len, self.bounds, self.flat, self.steep) = (len.min(RAYS), None, false, false);
+    }
+
+    /// Takes in a vector of rays.
+    #[inline(always)]
+    pub fn take<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>) {
+        store3(packet.org, &mut self.org, at);
+        store3(packet.dir, &mut self.dir, at);
+        packet.t_min.store(&mut self.t_min[at..]);
+        self.put(at, packet);
+    }
+
+    /// Sums up what was taken in.
+    #[inline(always)]
+    pub fn finish<V: Lanes<Scalar = S>>(&mut self) {
+        self.mean = self.sum_of_directions::<V>();
     }
 
     /// About that: entries after the last ray count too, as far as the vectors go.

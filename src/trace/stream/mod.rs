@@ -16,6 +16,7 @@ mod bounds;
 mod chunk;
 mod leaf;
 mod node;
+mod visitors;
 mod walk;
 
 use std::marker::PhantomData;
@@ -29,6 +30,7 @@ use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
 use block::Block;
 use chunk::{Best, Chunk, RAYS};
+pub use visitors::{MOST, Visitors};
 
 /// Rays that are sorted together.
 pub const SOURCE: usize = 4096;

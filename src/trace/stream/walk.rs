@@ -115,7 +115,18 @@ impl<S: Real> Walk<'_, S> {
             return;
         }
         let inside = local.enter::<V>(chunk, instance, &self.best.t, rays);
-        for (octant, rays) in local.octants(inside).into_iter().enumerate().filter(|&(_, rays)| rays != 0) {
+        self.octants::<V, ANY, COUNT>(object, inst, local, inside);
+    }
+
+    /// Takes some rays of any octants through an object, in its space.
+    pub fn octants<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        object: &Object<S>,
+        inst: u32,
+        local: &Chunk<S>,
+        rays: Set,
+    ) {
+        for (octant, rays) in local.octants(rays).into_iter().enumerate().filter(|&(_, rays)| rays != 0) {
             self.object::<V, ANY, COUNT>(object, inst, local, rays, octant);
         }
     }

@@ -294,9 +294,6 @@ impl Batch {
         let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
         planes.wild = in_front & !V::splat(LEAST_VOLUME).cmp_le(size).bits();
         planes.unsteady = in_front & !steady.bits();
-        if groups.is_behind {
-            planes.unsteady |= planes.flat;
-        }
         let own = |inverse: V| nearest.fast_min(farthest.fast_max(inverse));
         let [e0, e1, e2] = edges;
         planes.store(groups, &[e0, e1, e2, map3(normal, |n| n * rcp)], eps, own) & in_front | planes.wild

@@ -6,9 +6,9 @@
 //! coordinates. `tile` answers with that arithmetic ([`own`]; [`batch`] states its accuracy). In `tile-exact` the common
 //! formula decides where rounding could matter, so its hits are those of the other engines, bit by bit ([`exact`]).
 //! Instances are entered by taking the tile's frame through their maps ([`place`]), or, where their triangles are finer than
-//! the rays, group by group as packets ([`packets`]); shapes in them are tested ray by ray ([`shapes`]). To the stream kernel ([`super::stream`]) go blocks of rays without a common point, and worlds with solids,
-//! with more shapes than triangles, or with maps too flat for f32; for `tile-exact` also all worlds with instances. Single
-//! odd rays go to the packet kernel.
+//! the rays, by the stream kernel ([`fine`]); shapes in them are tested ray by ray ([`shapes`]). To the stream kernel
+//! ([`super::stream`]) go blocks of rays without a common point, and worlds with solids, with more shapes than triangles,
+//! or with maps too flat for f32; for `tile-exact` also all worlds with instances. Single odd rays go to the packet kernel.
 //!
 //! Sources: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm", 2005; Wald, Boulos, Shirley, "Ray tracing
 //! deformable scenes using dynamic bounding volume hierarchies", 2007; Fuetterling, Lojewski, Pfreundt, Ebert,
@@ -19,12 +19,14 @@ mod bundle;
 mod edges;
 mod engine;
 mod exact;
+mod fine;
 mod frame;
 mod groups;
+mod held;
+mod listing;
 mod mirror;
 mod node;
 mod own;
-mod packets;
 mod pairs;
 mod place;
 mod presumed;
@@ -79,11 +81,14 @@ pub struct Memory {
     groups: groups::Groups,
     batch: batch::Batch,
     planes: batch::Planes,
-    pairs: pairs::Pairs,
+    listing: listing::Listing,
+    again: pairs::Again,
     slabs: slab::Slabs,
     levels: Vec<node::Level>,
-    /// For shapes, and for instances that packets are taken through.
+    /// For shapes, and for what the stream kernel leaves to packets.
     stack: Stack<f32>,
+    /// For fine instances.
+    visitors: stream::Visitors<f32>,
     /// Where groups start that are for the stream kernel.
     rest: Vec<usize>,
     /// Single rays that are.
@@ -157,6 +162,7 @@ impl<'a> Job<'a> {
         let Scratch { single: super::Memory { stack, stream }, tile: memory, .. } = scratch;
         stack.reserve(world.stack_bound());
         memory.stack.reserve(world.stack_bound());
+        memory.visitors.reserve(world.stack_bound());
         Self { world, rays, memory, stack, stream, counters, output, most, past: rays.len() > MANY }
     }
 

@@ -12,7 +12,7 @@ use super::{Mask, V, select};
 use crate::lanes::chosen::merge;
 use crate::lanes::past::store_past;
 use crate::lanes::words::{below, positions};
-use crate::lanes::{LaneMask, Lanes, dot, each, f64x8, map3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, f64x8, map3};
 use crate::ray::{HitPacket, Hits, INVALID_ID};
 use crate::shape::{Block, Triangle};
 
@@ -20,23 +20,6 @@ use crate::shape::{Block, Triangle};
 #[inline(always)]
 pub fn own_depth(planes: &Planes, i: usize, inverse: V) -> V {
     V::splat(planes.nearest[i]).fast_min(V::splat(planes.farthest[i]).fast_max(inverse))
-}
-
-/// What a pair of triangle and group came to.
-#[derive(Clone, Copy, Debug)]
-pub struct Verdict {
-    /// Some ray hit the triangle.
-    pub hit: bool,
-    /// Some ray passes an edge within its rounding, or its best hit is as near: for [`pair_doubtful`].
-    pub doubt: bool,
-}
-
-impl Verdict {
-    /// `hit` of `possible` rays are certain.
-    #[inline(always)]
-    fn of(hit: Mask, possible: Mask) -> Self {
-        Self { hit: hit.any(), doubt: (possible & !hit).any() }
-    }
 }
 
 /// The numbers of a triangle: ties of depth go to the smaller instance, then to the smaller primitive.
@@ -71,33 +54,6 @@ impl Id {
     }
 }
 
-/// One triangle against the rays of one group that share their origin.
-#[inline(always)]
-pub fn pair<const ANY: bool, const MANY: bool>(
-    groups: &mut Groups,
-    planes: &Planes,
-    g: usize,
-    i: usize,
-    id: Id,
-) -> Verdict {
-    let Edges { possible, certain, weights } = edges(groups, planes, g, i);
-    let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
-    let best = groups.of[g].inv_lo;
-    let mut possible = possible & best.cmp_le(inverse);
-    if groups.ends_early {
-        possible = possible & inverse.cmp_le(groups.of[g].inv_hi);
-    }
-    if ANY {
-        let hit = possible & certain;
-        occlude(groups, g, hit);
-        return Verdict::of(hit, possible);
-    }
-    let hit = possible & certain & best.cmp_lt(inverse);
-    id.name::<MANY>(groups, g, hit);
-    keep(groups, g, hit, inverse, weights);
-    Verdict::of(hit, possible)
-}
-
 /// Keeps the depth and the weights of a hit.
 #[inline(always)]
 fn keep(groups: &mut Groups, g: usize, hit: Mask, inverse: V, found: [V; 2]) {
@@ -107,44 +63,10 @@ fn keep(groups: &mut Groups, g: usize, hit: Mask, inverse: V, found: [V; 2]) {
     weights[1] = select(hit, found[1], weights[1]);
 }
 
-/// One triangle against the rays of one group that share their end (any-hit).
-///
-/// Such rays start on surfaces, a few roundings in front of them. Depths from the far end cannot tell which side of
-/// its own surface a ray starts on; where the start lies with respect to the triangle's plane can.
+/// How far segments that begin at `start` begin behind a triangle's plane as seen from their common point; in some unit.
 #[inline(always)]
-pub fn pair_to_end(groups: &mut Groups, planes: &Planes, g: usize, i: usize) -> Verdict {
-    let Edges { possible, certain, .. } = edges(groups, planes, g, i);
-    let behind = behind(groups, planes, g, i);
-    let waiting = groups.of[g].inv_lo.cmp_lt(V::splat(f32::INFINITY));
-    let mut possible = possible & V::constant(0.0).cmp_le(behind) & waiting;
-    if groups.ends_early {
-        possible = possible & own_depth(planes, i, linear(groups, planes, g, i, 3)).cmp_le(groups.of[g].inv_hi);
-    }
-    let hit = possible & certain;
-    occlude(groups, g, hit);
-    Verdict::of(hit, possible)
-}
-
-/// One triangle against the rays of one group that share a point behind them. As with a common end, which side of a triangle
-/// they start on is told by the start; and so is how far ahead of it they hit.
-#[inline(always)]
-pub fn pair_ahead(groups: &mut Groups, planes: &Planes, g: usize, i: usize, id: Id) -> Verdict {
-    let Edges { possible, certain, weights } = edges(groups, planes, g, i);
-    let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
-    let best = groups.of[g].inv_lo;
-    let ahead = -behind(groups, planes, g, i);
-    let possible = possible & V::constant(0.0).cmp_le(ahead) & best.cmp_le(inverse);
-    let hit = possible & certain & best.cmp_lt(inverse);
-    groups.ahead[g] = select(hit, ahead * V::splat(planes.rcp[i]), groups.ahead[g]);
-    id.name::<false>(groups, g, hit);
-    keep(groups, g, hit, inverse, weights);
-    Verdict::of(hit, possible)
-}
-
-/// How far the segments of a group start behind a triangle's plane as seen from their common point; in some unit.
-#[inline(always)]
-fn behind(groups: &Groups, planes: &Planes, g: usize, i: usize) -> V {
-    let (normal, way) = planes.to_starts(i, &groups.of[g].start);
+pub fn behind(start: &Lanes3<V>, planes: &Planes, i: usize) -> V {
+    let (normal, way) = planes.to_starts(i, start);
     dot(normal, way)
 }
 
@@ -161,11 +83,14 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     id: Id,
     to_end: bool,
 ) -> bool {
-    let inverse = own_depth(planes, i, linear(groups, planes, g, i, 3));
+    let ray = [groups.of[g].s, groups.of[g].t];
+    let inverse = own_depth(planes, i, linear(ray, planes, i, 3));
     let best = groups.of[g].inv_lo;
-    let mut maybe = edges(groups, planes, g, i).possible & inverse.cmp_le(groups.of[g].inv_hi);
+    let mut maybe = edges(ray, planes, i).possible & inverse.cmp_le(groups.of[g].inv_hi);
     if ANY && to_end {
-        maybe = maybe & V::constant(0.0).cmp_le(behind(groups, planes, g, i)) & best.cmp_lt(V::splat(f32::INFINITY));
+        maybe = maybe
+            & V::constant(0.0).cmp_le(behind(&groups.of[g].start, planes, i))
+            & best.cmp_lt(V::splat(f32::INFINITY));
     } else {
         maybe = maybe & best.cmp_le(inverse);
     }
@@ -173,7 +98,7 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     if !ANY {
         maybe = maybe & (best.cmp_lt(inverse) | id.is_not_after::<MANY>(groups, g));
         if groups.is_behind {
-            ahead = -behind(groups, planes, g, i);
+            ahead = -behind(&groups.of[g].start, planes, i);
             maybe = maybe & V::constant(0.0).cmp_le(ahead);
         }
     }
@@ -228,26 +153,26 @@ fn weights_f64(corners: &[[f64; 3]; 3], ray: [f64x8; 2]) -> (u32, [f64x8; 2]) {
     (inside, [weight(edges[1]), weight(edges[2])])
 }
 
-/// A linear function of triangle `i` at the rays of a group.
+/// A linear function of triangle `i` at some rays.
 #[inline(always)]
-fn linear(groups: &Groups, planes: &Planes, g: usize, i: usize, k: usize) -> V {
+pub fn linear([s, t]: [V; 2], planes: &Planes, i: usize, k: usize) -> V {
     let [x, y, z] = each(|x| V::splat(planes.linear[k][x][i]));
-    x.mul_add(groups.of[g].s, y.mul_add(groups.of[g].t, z))
+    x.mul_add(s, y.mul_add(t, z))
 }
 
-/// A triangle's edges against the rays of a group.
-struct Edges {
+/// A triangle's edges against some rays.
+pub struct Edges {
     /// Lanes not surely outside.
-    possible: Mask,
+    pub possible: Mask,
     /// Lanes surely inside.
-    certain: Mask,
+    pub certain: Mask,
     /// Weights of the second and third corner, times 1/z.
-    weights: [V; 2],
+    pub weights: [V; 2],
 }
 
 #[inline(always)]
-fn edges(groups: &Groups, planes: &Planes, g: usize, i: usize) -> Edges {
-    let [e0, e1, e2] = each(|k| linear(groups, planes, g, i, k));
+pub fn edges(ray: [V; 2], planes: &Planes, i: usize) -> Edges {
+    let [e0, e1, e2] = each(|k| linear(ray, planes, i, k));
     let least = e0.fast_min(e1).fast_min(e2);
     let [possible, certain] = [planes.outside[i], planes.inside[i]].map(|x| V::splat(x).cmp_le(least));
     Edges { possible, certain, weights: [e1, e2] }
@@ -256,7 +181,7 @@ fn edges(groups: &Groups, planes: &Planes, g: usize, i: usize) -> Edges {
 /// Whether some ray of a group is not certainly outside triangle `i`.
 #[inline(always)]
 pub fn may_be_inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> bool {
-    edges(groups, planes, g, i).possible.any()
+    edges([groups.of[g].s, groups.of[g].t], planes, i).possible.any()
 }
 
 /// Lanes that found something want nothing any more.

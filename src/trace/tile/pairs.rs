@@ -1,48 +1,44 @@
 //! Set-up triangles against groups and rays.
 
-use super::batch::{BATCH, Planes};
+use super::batch::BATCH;
 use super::bundle::Shared;
 use super::exact::{self, Exact, certain_pair};
-use super::groups::Groups;
-use super::own::{self, Id, Verdict, may_be_inside, own_depth, pair, pair_ahead, pair_doubtful, pair_to_end};
-use super::{GROUPS, Memory, SET, SETS, V};
-use crate::lanes::words::list_bits;
-use crate::lanes::{LaneMask, Lanes, each};
+use super::held::{Held, Verdict};
+use super::own::{self, Id, may_be_inside, pair_doubtful};
+use super::{GROUPS, Memory, SET, V};
+use crate::lanes::chosen::lanes_of;
+use crate::lanes::{LaneMask, Lanes};
 use crate::ray::Counters;
 
-/// Most pairs of a triangle and a group.
-const MOST: usize = BATCH * GROUPS;
-
-/// Pairs of a triangle and a group, with room for whole lists at the end.
+/// Groups with the triangles, as bits, that are to be looked at again.
 #[derive(Clone, Debug)]
-pub struct Pairs {
-    group: [u8; MOST + SET],
-    triangle: [u8; MOST + SET],
-    /// Numbers of the pairs to look at again.
-    again: [u16; MOST],
+pub struct Again {
+    of: [(u16, u16); GROUPS],
+    len: usize,
 }
 
-impl Default for Pairs {
+impl Default for Again {
     fn default() -> Self {
-        Self { group: [0; MOST + SET], triangle: [0; MOST + SET], again: [0; MOST] }
+        Self { of: [(0, 0); GROUPS], len: 0 }
     }
 }
 
-impl Pairs {
-    /// Group and triangle of a pair.
-    #[inline(always)]
-    fn get(&self, k: usize) -> (usize, usize) {
-        (usize::from(self.group[k]) & (GROUPS - 1), usize::from(self.triangle[k]) & 15)
-    }
-}
-
-/// What [`list`] found.
+/// What pairs came to.
 #[derive(Clone, Copy, Debug, Default)]
-struct Listed {
-    /// Pairs.
-    pairs: usize,
-    /// Sets they are of, as bits.
+struct Tested {
+    /// Pairs that gave something.
+    found: usize,
+    /// Sets in which some did, as bits.
     sets: u32,
+}
+
+impl Tested {
+    /// `count` pairs of group `g` gave something.
+    #[inline(always)]
+    fn find(&mut self, g: usize, count: u32) {
+        self.found += count as usize;
+        self.sets |= u32::from(count != 0) << (g / SET);
+    }
 }
 
 /// Sets up the waiting triangles and takes their hits.
@@ -52,155 +48,122 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     exact: &Exact,
     counters: &mut Counters,
 ) {
-    let Memory { groups, batch, planes, pairs, .. } = memory;
+    let Memory { groups, batch, planes, listing, .. } = memory;
     let seen = batch.set_up::<ANY, EXACT>(groups, planes);
-    // Triangles that are not for the plain test alone come last: which test is next is never a surprise.
-    let odd = if EXACT { 0 } else { planes.wild | if ANY { 0 } else { planes.unsteady } };
-    let mut listed = Listed::default();
-    list::<N, EXACT, false>(seen & !odd, &batch.groups, groups, planes, pairs, &mut listed);
-    let plain = listed.pairs;
-    if seen & odd != 0 {
-        list::<N, EXACT, true>(seen & odd, &batch.groups, groups, planes, pairs, &mut listed);
-    }
-    let count = listed.pairs;
-    let found = match (!EXACT && groups.many, !ANY && groups.is_behind) {
-        (true, _) => test::<ANY, EXACT, true, false, COUNT>(memory, exact, [plain, count], counters),
-        (_, true) => test::<ANY, EXACT, false, true, COUNT>(memory, exact, [plain, count], counters),
-        _ => test::<ANY, EXACT, false, false, COUNT>(memory, exact, [plain, count], counters),
+    listing.fill::<N, EXACT>(seen, &batch.groups, groups, planes);
+    let to_end = ANY && matches!(exact.bundle.shared, Shared::End(_));
+    let is_behind = !ANY && groups.is_behind;
+    let Tested { found, sets } = match (EXACT, groups.many, is_behind, to_end) {
+        (true, _, true, _) => test_exact::<ANY, true, COUNT>(memory, exact, counters),
+        (true, ..) => test_exact::<ANY, false, COUNT>(memory, exact, counters),
+        (_, true, _, true) => test::<ANY, true, false, true, COUNT>(memory, exact, counters),
+        (_, true, ..) => test::<ANY, true, false, false, COUNT>(memory, exact, counters),
+        (_, _, true, _) => test::<ANY, false, true, false, COUNT>(memory, exact, counters),
+        (.., true) => test::<ANY, false, false, true, COUNT>(memory, exact, counters),
+        _ => test::<ANY, false, false, false, COUNT>(memory, exact, counters),
     };
     memory.batch.clear();
-    memory.slabs.learn(count, found);
-    if count != 0 {
-        memory.groups.refresh::<N>(listed.sets);
+    memory.slabs.learn(memory.listing.pairs, found);
+    if sets != 0 {
+        memory.groups.refresh::<N>(sets);
     }
 }
 
-/// Tests the listed pairs, the first `plain` of them by the plain test; returns how many gave something. `MANY`: triangles are
-/// of instances. `BEHIND`: the common point is behind the rays.
+/// The set bits of `bits`, each a triangle of a batch.
 #[inline(always)]
-fn test<const ANY: bool, const EXACT: bool, const MANY: bool, const BEHIND: bool, const COUNT: bool>(
+fn triangles(bits: u32) -> impl Iterator<Item = usize> {
+    lanes_of(bits).map(|i| i & (BATCH - 1))
+}
+
+/// Tests the listed pairs. `MANY`: triangles are of instances. `BEHIND`: the common point is behind the rays. `END`: it is
+/// where they end.
+#[inline(always)]
+fn test<const ANY: bool, const MANY: bool, const BEHIND: bool, const END: bool, const COUNT: bool>(
     memory: &mut Memory,
     exact: &Exact,
-    [plain, count]: [usize; 2],
     counters: &mut Counters,
-) -> usize {
-    let Memory { groups, batch, planes, pairs, .. } = memory;
-    let (mut found, mut again) = (0, 0);
-    let to_end = matches!(exact.bundle.shared, Shared::End(_));
+) -> Tested {
+    let Memory { groups, batch, planes, listing, again, .. } = memory;
     let id = |i: usize| Id { inst: batch.inst[i], prim: batch.id[i] };
-    for k in 0..plain {
-        let (g, i) = pairs.get(k);
-        if COUNT {
-            count_pair(groups, g, counters);
+    let ends_early = groups.ends_early;
+    let unsteady = if ANY { 0 } else { planes.unsteady };
+    // What the plain test is not for comes last: which test is next is never a surprise.
+    let odd = planes.wild | if BEHIND { planes.flat } else { 0 };
+    let mut tested = Tested::default();
+    again.len = 0;
+    for k in 0..listing.len() {
+        let (g, met) = listing.get(k);
+        if met & !odd == 0 {
+            continue;
         }
-        if EXACT {
+        let (mut held, mut hits, mut doubts) = (Held::of::<MANY>(groups, g), 0, 0);
+        for i in triangles(met & !odd) {
+            if COUNT {
+                count_pair(held.best, counters);
+            }
+            let Verdict { hit, doubt } = held.pair::<ANY, MANY, BEHIND, END>(planes, i, id(i), ends_early);
+            hits |= u32::from(hit) << i;
+            doubts |= u32::from(doubt) << i;
+        }
+        held.put::<ANY, MANY, BEHIND>(groups, g);
+        tested.find(g, hits.count_ones());
+        // Always written, counted where there are any: that is a surprise every time.
+        let doubts = doubts | hits & unsteady;
+        again.of[again.len & (GROUPS - 1)] = (g as u16, doubts as u16);
+        again.len += usize::from(doubts != 0);
+    }
+    if odd != 0 {
+        for k in 0..listing.len() {
+            let (g, met) = listing.get(k);
+            for i in triangles(met & odd) {
+                if COUNT {
+                    count_pair(groups.of[g].inv_lo, counters);
+                }
+                if planes.wild >> i & 1 != 0 || may_be_inside(groups, planes, g, i) {
+                    tested.find(g, own::decide::<ANY, MANY>(groups, exact, g, batch, i).into());
+                }
+            }
+        }
+    }
+    for &(g, doubts) in again.of.iter().take(again.len) {
+        for i in triangles(doubts.into()) {
+            let found = pair_doubtful::<ANY, MANY>(groups, planes, g.into(), i, id(i), END);
+            tested.sets |= u32::from(found) << (usize::from(g) / SET);
+        }
+    }
+    tested
+}
+
+/// Tests the listed pairs as far as the tile's arithmetic is certain, by the common formula from there on.
+#[inline(always)]
+fn test_exact<const ANY: bool, const BEHIND: bool, const COUNT: bool>(
+    memory: &mut Memory,
+    exact: &Exact,
+    counters: &mut Counters,
+) -> Tested {
+    let Memory { groups, batch, planes, listing, .. } = memory;
+    let mut tested = Tested::default();
+    for k in 0..listing.len() {
+        let (g, met) = listing.get(k);
+        for i in triangles(met) {
+            if COUNT {
+                count_pair(groups.of[g].inv_lo, counters);
+            }
             let (certain, doubtful) = certain_pair::<ANY, BEHIND>(groups, planes, g, i, batch.id[i]);
-            found += usize::from(certain | doubtful != 0);
+            tested.find(g, (certain | doubtful != 0).into());
             if doubtful != 0 {
                 exact::decide::<ANY>(groups, exact, g, batch.id[i], doubtful);
             }
-            continue;
-        }
-        let Verdict { hit, doubt } = plain_pair::<ANY, MANY, BEHIND>(groups, planes, (g, i), id(i), to_end);
-        found += usize::from(hit);
-        // Always written, counted where it is wanted: a call in this loop would take the registers of all of it.
-        pairs.again[again.min(MOST - 1)] = k as u16;
-        again += usize::from(doubt);
-    }
-    for k in plain..count {
-        let (g, i) = pairs.get(k);
-        if COUNT {
-            count_pair(groups, g, counters);
-        }
-        let is_flat = BEHIND && planes.flat >> i & 1 != 0;
-        if planes.wild >> i & 1 != 0 || is_flat && may_be_inside(groups, planes, g, i) {
-            found += usize::from(own::decide::<ANY, MANY>(groups, exact, g, batch, i));
-        } else if !is_flat {
-            let Verdict { hit, doubt } = plain_pair::<ANY, MANY, BEHIND>(groups, planes, (g, i), id(i), to_end);
-            found += usize::from(hit);
-            pairs.again[again.min(MOST - 1)] = k as u16;
-            again += usize::from(hit | doubt);
         }
     }
-    for &k in pairs.again.iter().take(again) {
-        let (g, i) = pairs.get(usize::from(k));
-        pair_doubtful::<ANY, MANY>(groups, planes, g, i, id(i), to_end);
-    }
-    found
+    tested
 }
 
-/// The test of a pair by the kind of rays.
-#[inline(always)]
-fn plain_pair<const ANY: bool, const MANY: bool, const BEHIND: bool>(
-    groups: &mut Groups,
-    planes: &Planes,
-    (g, i): (usize, usize),
-    id: Id,
-    to_end: bool,
-) -> Verdict {
-    if ANY && to_end {
-        pair_to_end(groups, planes, g, i)
-    } else if BEHIND {
-        pair_ahead(groups, planes, g, i, id)
-    } else {
-        pair::<ANY, MANY>(groups, planes, g, i, id)
-    }
-}
-
-fn count_pair(groups: &Groups, g: usize, counters: &mut Counters) {
+/// `best`: depths of the group's best hits.
+fn count_pair(best: V, counters: &mut Counters) {
     counters.prims += 1;
     counters.prim_lanes_total += V::N as u64;
     counters.prim_lanes_linear += V::N as u64;
-    let waiting = groups.of[g].inv_lo.cmp_lt(V::splat(f32::INFINITY));
+    let waiting = best.cmp_lt(V::splat(f32::INFINITY));
     counters.prim_lanes_active += u64::from(waiting.bits().count_ones());
-}
-
-/// Adds the pairs of `seen` triangles whose rectangles and depths meet. `ODD`: some may be wild, and meet all.
-#[inline(always)]
-fn list<const N: usize, const EXACT: bool, const ODD: bool>(
-    seen: u32,
-    wanted: &[u64],
-    groups: &Groups,
-    planes: &Planes,
-    pairs: &mut Pairs,
-    listed: &mut Listed,
-) {
-    let mut count = listed.pairs;
-    for q in 0..N {
-        let here = |i: usize| (wanted[i] >> (q * SET)) as u32 & 0xffff;
-        // Set by set: few branches to go wrong, and the pairs of a set stay together.
-        let mut rest = seen;
-        if N > 1 {
-            let mut some = 0;
-            for i in 0..BATCH {
-                some |= u32::from(here(i) != 0) << i;
-            }
-            rest &= some;
-        }
-        let before = count;
-        while rest != 0 {
-            let i = rest.trailing_zeros() as usize & 15;
-            rest &= rest - 1;
-            // The largest value over each group's rectangle, one group per lane.
-            let largest = |k: usize| {
-                let [x, y, z] = each(|x| V::splat(planes.linear[k][x][i]));
-                let [s, t] = [0, 1].map(|axis| {
-                    groups.rect[axis].as_flattened()[(planes.corner[k][axis][i] as usize + q) & (2 * SETS - 1)]
-                });
-                x.mul_add(s, y.mul_add(t, z))
-            };
-            let edge = largest(0).fast_min(largest(1)).fast_min(largest(2));
-            let inverse = largest(3);
-            let inverse = if EXACT { inverse * V::splat(planes.most[i]) } else { own_depth(planes, i, inverse) };
-            let met = V::splat(planes.outside[i]).cmp_le(edge) & groups.least[q].cmp_le(inverse);
-            let unknown = if ODD && planes.wild >> i & 1 != 0 { V::ALL } else { 0 };
-            let mask = (met.bits() | unknown) & here(i);
-            let at = count.min(MOST);
-            let Some(list) = pairs.group[at..].first_chunk_mut() else { break };
-            count = at + list_bits(mask, (q * SET) as u8, list);
-            pairs.triangle[at..at + SET].fill(i as u8);
-        }
-        listed.sets |= u32::from(count != before) << q;
-    }
-    listed.pairs = count;
 }

@@ -3,8 +3,8 @@
 
 use super::batch::BATCH;
 use super::exact::Exact;
+use super::fine;
 use super::node::{self, Level, Planes, key};
-use super::packets;
 use super::pairs::flush;
 use super::place::{self, Place};
 use super::shapes;
@@ -46,9 +46,9 @@ struct Blocks<'a> {
 /// Instances.
 struct Instances<'a>(&'a World<f32>);
 
-/// Triangles per ray from which on an instance is seen so small that its triangles have few rays in common: packets are the
-/// faster way through it.
-const FINE: f32 = 4.0;
+/// Triangles per ray from which on an instance is seen so small that its triangles have few rays in common: the stream kernel is
+/// the faster way through it.
+const FINE: f32 = 1.5;
 
 /// Groups up to which the box of an instance is tested against their single rays in any case: to enter it costs several times as
 /// much.
@@ -242,8 +242,8 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
         let triangles = (world.objects[*object as usize].triangles.len() * BLOCK) as f32;
         // What the tile and the instance alone say: answers must not depend on what was learnt or found before.
         if triangles > FINE * memory.groups.rays_on::<N>(bounds) {
-            let Memory { groups: state, stack, .. } = memory;
-            return packets::visit::<N, ANY, COUNT>(state, exact, inst, groups, stack, counters);
+            let Memory { groups: state, stack, visitors, .. } = memory;
+            return fine::visit::<N, ANY, COUNT>(state, exact, inst, groups, (visitors, stack), counters);
         }
         let state = &memory.groups;
         let place = Place::new(world, inst, &state.frame);

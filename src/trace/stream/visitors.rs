@@ -1,0 +1,76 @@
+//! Rays of another engine, as they come: a chunk in an object's space that is filled vector by vector.
+
+use super::chunk::{Best, Chunk, RAYS, Set};
+use super::leaf::Closer;
+use super::walk::{Pile, Walk};
+use crate::lanes::{Lanes, Real};
+use crate::ray::{Counters, HitPacket, Packet};
+use crate::scene::world::Object;
+use crate::trace::query::Stack;
+
+/// Most rays that are traced together.
+pub const MOST: usize = RAYS;
+
+/// Vectors of rays that another engine takes through an object, some at a time.
+#[derive(Clone, Debug)]
+pub struct Visitors<S> {
+    chunk: Chunk<S>,
+    best: Best<S>,
+    waiting: Pile<S>,
+    closer: Closer<S>,
+    rays: Set,
+}
+
+impl<S: Real> Default for Visitors<S> {
+    fn default() -> Self {
+        let (waiting, closer) = (Pile::default(), Closer::default());
+        Self { chunk: Chunk::default(), best: Best::default(), waiting, closer, rays: 0 }
+    }
+}
+
+impl<S: Real> Visitors<S> {
+    /// Makes room for a world whose [`World::stack_bound`](crate::scene::world::World::stack_bound) is `bound`.
+    pub fn reserve(&mut self, bound: usize) {
+        self.waiting.reserve(bound);
+    }
+
+    /// Puts vector `k` of those that [`Visitors::trace`] is for; rays of `lanes` are traced up to `t_max`.
+    #[inline(always)]
+    pub fn put<V: Lanes<Scalar = S>>(&mut self, k: usize, packet: &Packet<V>, t_max: V, lanes: u32) {
+        if k == 0 {
+            self.chunk.start(RAYS);
+            self.rays = 0;
+            self.best.start();
+        }
+        self.chunk.take(k * V::N, packet);
+        t_max.store(&mut self.best.t[k * V::N..]);
+        self.rays |= Set::from(lanes) << (k * V::N);
+    }
+
+    /// Traces the first `vectors` of them through an object, in its space.
+    pub fn trace<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        vectors: usize,
+        (object, inst): (&Object<S>, u32),
+        stack: &mut Stack<S>,
+        counters: &mut Counters,
+    ) {
+        let Self { chunk, best, waiting, closer, rays } = self;
+        chunk.len = vectors * V::N;
+        chunk.finish::<V>();
+        let mut walk = Walk { best, waiting, closer, stack, counters };
+        walk.octants::<V, ANY, COUNT>(object, inst, chunk, *rays);
+    }
+
+    /// What the rays of vector `k` hit.
+    #[inline(always)]
+    pub fn hits<V: Lanes<Scalar = S>>(&self, k: usize) -> HitPacket<V> {
+        self.best.packet(k * V::N)
+    }
+
+    /// Any-hit: the rays of vector `k` that hit something.
+    #[inline(always)]
+    pub fn done<V: Lanes<Scalar = S>>(&self, k: usize) -> u32 {
+        (self.best.done >> (k * V::N)) as u32 & V::ALL
+    }
+}

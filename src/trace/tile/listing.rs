@@ -1,0 +1,218 @@
+//! Which of the triangles that were set up together the groups of a tile meet: by rectangle and depth, no ray looked at.
+//!
+//! Sixteen groups at a time against one triangle, or sixteen triangles at a time against one group. Both come to the same pairs,
+//! bit by bit: a linear function is largest at one corner of a rectangle, and its roundings are monotone.
+
+use super::batch::{BATCH, Planes};
+use super::groups::Groups;
+use super::own::own_depth;
+use super::{GROUPS, SET, SETS, V};
+use crate::lanes::words::{Columns, list_bits, words_with_bit};
+use crate::lanes::{LaneMask, Lanes, each};
+
+/// What a set costs with one triangle, where a group costs one with all triangles.
+const SET_COST: u32 = 1;
+
+/// The groups that meet triangles, and which.
+#[derive(Clone, Debug)]
+pub struct Listing {
+    /// By group: triangles, as bits. Only of those that are listed.
+    triangles: [u16; GROUPS],
+    /// The groups; with room for a whole list at the end.
+    groups: [u8; GROUPS + SET],
+    len: usize,
+    /// Pairs of a group and a triangle.
+    pub pairs: usize,
+}
+
+impl Default for Listing {
+    fn default() -> Self {
+        Self { triangles: [0; GROUPS], groups: [0; GROUPS + SET], len: 0, pairs: 0 }
+    }
+}
+
+impl Listing {
+    /// Groups that meet triangles.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.len.min(GROUPS)
+    }
+
+    /// A group, and the triangles it meets, as bits.
+    #[inline(always)]
+    pub fn get(&self, k: usize) -> (usize, u32) {
+        let g = usize::from(self.groups[k]) & (GROUPS - 1);
+        (g, self.triangles[g].into())
+    }
+
+    /// Lists which of the `seen` triangles the groups of `N` sets meet, of those that met their leaves.
+    #[inline(always)]
+    pub fn fill<const N: usize, const EXACT: bool>(
+        &mut self,
+        seen: u32,
+        met_leaves: &[u64],
+        groups: &Groups,
+        planes: &Planes,
+    ) {
+        // Loops: closures over arrays of this length become calls, which cost more than what they do.
+        let (mut wanted, mut any, mut some) = ([0; BATCH], 0, [0; SETS]);
+        for (i, wanted) in wanted.iter_mut().enumerate() {
+            *wanted = if seen >> i & 1 != 0 { met_leaves[i] } else { 0 };
+            any |= *wanted;
+            for (q, some) in some.iter_mut().enumerate().take(N) {
+                *some |= u32::from(*wanted >> (q * SET) & 0xffff != 0) << i;
+            }
+        }
+        (self.len, self.pairs) = (0, 0);
+        if any.count_ones() <= SET_COST * some.iter().map(|some| some.count_ones()).sum::<u32>() {
+            self.by_groups::<EXACT>(&wanted, any, groups, planes);
+        } else {
+            for (q, some) in some.into_iter().enumerate().take(N) {
+                self.set::<EXACT>(q, &wanted, some, groups, planes);
+            }
+        }
+    }
+
+    /// All triangles against one group after the other.
+    #[inline(always)]
+    fn by_groups<const EXACT: bool>(&mut self, wanted: &[u64; BATCH], any: u64, groups: &Groups, planes: &Planes) {
+        let linear = |k: usize| each(|x| V::load(&planes.linear[k][x]));
+        let linear = [linear(0), linear(1), linear(2), linear(3)];
+        let (outside, most) = (V::load(&planes.outside), V::load(&planes.most));
+        let (nearest, farthest) = (V::load(&planes.nearest), V::load(&planes.farthest));
+        let wild = if EXACT { 0 } else { planes.wild };
+        let of_all = |sets| bytemuck::cast_ref::<[V; SETS], [f32; GROUPS]>(sets);
+        let [[low_s, high_s], [low_t, high_t]] = &groups.rect;
+        let (low_s, high_s, low_t, high_t) = (of_all(low_s), of_all(high_s), of_all(low_t), of_all(high_t));
+        let least = of_all(&groups.least);
+        let mut rest = any;
+        while rest != 0 {
+            let g = rest.trailing_zeros() as usize & (GROUPS - 1);
+            rest &= rest - 1;
+            let (s0, s1, t0, t1) = (V::splat(low_s[g]), V::splat(high_s[g]), V::splat(low_t[g]), V::splat(high_t[g]));
+            let largest = |k: usize| {
+                let [x, y, z]: [V; 3] = linear[k];
+                let along = y.mul_add(t0, z).fast_max(y.mul_add(t1, z));
+                x.mul_add(s0, along).fast_max(x.mul_add(s1, along))
+            };
+            let edge = largest(0).fast_min(largest(1)).fast_min(largest(2));
+            let inverse = largest(3);
+            let inverse = if EXACT { inverse * most } else { nearest.fast_min(farthest.fast_max(inverse)) };
+            let met = outside.cmp_le(edge) & V::splat(least[g]).cmp_le(inverse);
+            let met = (met.bits() | wild) & words_with_bit(wanted, g as u32);
+            // Always written, counted where there are any: that is a surprise every time.
+            self.triangles[g] = met as u16;
+            self.groups[self.len & (GROUPS - 1)] = g as u8;
+            self.len += usize::from(met != 0);
+            self.pairs += met.count_ones() as usize;
+        }
+    }
+
+    /// All groups of set `q` against one after the other of some triangles.
+    #[inline(always)]
+    fn set<const EXACT: bool>(&mut self, q: usize, wanted: &[u64; BATCH], some: u32, groups: &Groups, planes: &Planes) {
+        let mut met_by = Columns::none();
+        let mut rest = some;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize & (BATCH - 1);
+            rest &= rest - 1;
+            // The largest value over each group's rectangle, one group per lane.
+            let largest = |k: usize| {
+                let [x, y, z] = each(|x| V::splat(planes.linear[k][x][i]));
+                let [s, t] = [0, 1].map(|axis| {
+                    groups.rect[axis].as_flattened()[(planes.corner[k][axis][i] as usize + q) & (2 * SETS - 1)]
+                });
+                x.mul_add(s, y.mul_add(t, z))
+            };
+            let edge = largest(0).fast_min(largest(1)).fast_min(largest(2));
+            let inverse = largest(3);
+            let inverse = if EXACT { inverse * V::splat(planes.most[i]) } else { own_depth(planes, i, inverse) };
+            let met = V::splat(planes.outside[i]).cmp_le(edge) & groups.least[q].cmp_le(inverse);
+            let wild = if EXACT { 0 } else { 0u32.wrapping_sub(planes.wild >> i & 1) };
+            let met = (met.bits() | wild) & (wanted[i] >> (q * SET)) as u32 & 0xffff;
+            self.pairs += met.count_ones() as usize;
+            met_by = met_by.with(met, i as u32);
+        }
+        let met = met_by.not_zero();
+        self.triangles[q * SET..][..SET].copy_from_slice(&met_by.words());
+        if let Some(list) = self.groups[self.len.min(GROUPS)..].first_chunk_mut() {
+            self.len += list_bits(met, (q * SET) as u8, list);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Groups with the triangles they meet, in the order of groups.
+    fn pairs(listing: &Listing) -> Vec<(usize, u32)> {
+        let mut pairs: Vec<_> = (0..listing.len()).map(|k| listing.get(k)).collect();
+        pairs.sort_unstable();
+        assert_eq!(listing.pairs, pairs.iter().map(|(_, met)| met.count_ones() as usize).sum::<usize>());
+        pairs
+    }
+
+    #[test]
+    fn groups_and_sets_list_the_same_pairs() {
+        let mut state = 5u64;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / 16_777_216.0 - 0.5
+        };
+        let (mut groups, mut planes) = (Box::<Groups>::default(), Box::<Planes>::default());
+        let (mut by_groups, mut by_sets, mut listed) = (Listing::default(), Listing::default(), 0);
+        for round in 0..200 {
+            let mut numbers = |size: f32| V::new(std::array::from_fn(|_| size * next()));
+            for q in 0..SETS {
+                for axis in 0..2 {
+                    let low = numbers(1.0);
+                    groups.rect[axis][0][q] = low;
+                    groups.rect[axis][1][q] = low + numbers(0.2).abs();
+                }
+                groups.least[q] = numbers(1.0);
+            }
+            for k in 0..4 {
+                for axis in 0..3 {
+                    numbers(1.0).store(&mut planes.linear[k][axis]);
+                }
+                for axis in 0..2 {
+                    let is_low = planes.linear[k][axis].map(|x| x < 0.0);
+                    planes.corner[k][axis] = is_low.map(|is_low| if is_low { 0 } else { SETS as u32 });
+                }
+            }
+            let columns = [&mut planes.outside, &mut planes.nearest, &mut planes.farthest, &mut planes.most];
+            columns.into_iter().for_each(|column| numbers(0.5).store(column));
+            planes.wild = u32::from(round % 3 == 0) << (round % 16);
+            let wanted: [u64; BATCH] = std::array::from_fn(|i| ((next() * 1e6) as i64 as u64) << (4 * i) ^ i as u64);
+            let any = wanted.iter().fold(0, |any, wanted| any | wanted);
+            let (groups, planes) = (&*groups, &*planes);
+            let mut both = |exact: bool| {
+                for listing in [&mut by_groups, &mut by_sets] {
+                    (listing.len, listing.pairs) = (0, 0);
+                }
+                match exact {
+                    true => by_groups.by_groups::<true>(&wanted, any, groups, planes),
+                    false => by_groups.by_groups::<false>(&wanted, any, groups, planes),
+                }
+                for q in 0..SETS {
+                    match exact {
+                        true => by_sets.set::<true>(q, &wanted, 0xffff, groups, planes),
+                        false => by_sets.set::<false>(q, &wanted, 0xffff, groups, planes),
+                    }
+                }
+                let pairs = [pairs(&by_groups), pairs(&by_sets)];
+                assert_eq!(pairs[0], pairs[1]);
+                for &(g, met) in &pairs[0] {
+                    let is_wanted = |i: &usize| wanted[*i] >> g & 1 != 0;
+                    assert!((0..BATCH).filter(|i| met >> i & 1 != 0).all(|i| is_wanted(&i)));
+                    let wild = if exact { 0 } else { planes.wild };
+                    assert!((0..BATCH).filter(is_wanted).all(|i| wild & !met & 1 << i == 0));
+                }
+                by_groups.pairs
+            };
+            listed += both(false) + both(true);
+        }
+        assert!((10_000..200_000).contains(&listed), "{listed}");
+    }
+}
