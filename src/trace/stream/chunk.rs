@@ -279,17 +279,18 @@ impl<S: Real> Chunk<S> {
         }
     }
 
-    /// Rays by octant.
-    pub fn octants(&self, rays: Set) -> [Set; OCTANTS] {
-        let mut masks = [0; OCTANTS];
-        let mut rest = rays;
+    /// The octant of the first of some rays, and those of the same.
+    #[inline(always)]
+    pub fn first_octant(&self, rays: Set) -> (usize, Set) {
+        let octant = |i: usize| (0..3).fold(0, |o, axis| o | usize::from(self.rcp[axis][i] < S::ZERO) << axis);
+        let first = octant(rays.trailing_zeros() as usize & (RAYS - 1));
+        let (mut rest, mut alike) = (rays, 0);
         while rest != 0 {
             let i = rest.trailing_zeros() as usize & (RAYS - 1);
             rest &= rest - 1;
-            let octant = (0..3).fold(0, |o, axis| o | usize::from(self.rcp[axis][i] < S::ZERO) << axis);
-            masks[octant] |= 1 << i;
+            alike |= Set::from(octant(i) == first) << i;
         }
-        masks
+        (first, alike)
     }
 }
 

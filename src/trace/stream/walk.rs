@@ -88,8 +88,11 @@ impl<S: Real> Walk<'_, S> {
             return;
         }
         let top = &world.top;
-        let fetch =
-            |child: Child| prefetch_either(&top.nodes, &world.top_leaves, child.is_leaf(), child.index as usize);
+        let fetch = |child: Child| {
+            let (at, is_leaf) = (child.index as usize, child.is_leaf());
+            let inst = world.top_leaves[if is_leaf { at } else { 0 }] as usize;
+            prefetch_either(&top.nodes, &world.instances, is_leaf, if is_leaf { inst } else { at });
+        };
         self.tree::<V, ANY, COUNT>(top, chunk, all, octant, &fetch, |walk, leaf, rays| {
             let inst = world.top_leaves[leaf.index as usize];
             walk.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, rays);
@@ -126,8 +129,11 @@ impl<S: Real> Walk<'_, S> {
         local: &Chunk<S>,
         rays: Set,
     ) {
-        for (octant, rays) in local.octants(rays).into_iter().enumerate().filter(|&(_, rays)| rays != 0) {
-            self.object::<V, ANY, COUNT>(object, inst, local, rays, octant);
+        let mut rest = rays;
+        while rest != 0 {
+            let (octant, alike) = local.first_octant(rest);
+            rest &= !alike;
+            self.object::<V, ANY, COUNT>(object, inst, local, alike, octant);
         }
     }
 

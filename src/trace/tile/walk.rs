@@ -226,7 +226,9 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
 {
     #[inline(always)]
     fn fetch(&self, leaf: Child) {
-        prefetch(&self.0.assembly.placements, self.0.top_leaves[leaf.index as usize] as usize);
+        let inst = self.0.top_leaves[leaf.index as usize] as usize;
+        prefetch(&self.0.instances, inst);
+        prefetch(&self.0.assembly.placements, inst);
     }
 
     #[inline(always)]
