@@ -174,6 +174,8 @@ impl<'a> Job<'a> {
         }
         // What one call learns must not change what another one answers.
         self.memory.slabs.forget();
+        // Later ones are asked for while those before them are read.
+        (0..bundle::AHEAD).for_each(|g| bundle::prefetch_rays(self.rays, g * V::N));
         for first in (0..self.rays.len()).step_by(BLOCK) {
             if !suits {
                 self.leave::<SETS>(first);
