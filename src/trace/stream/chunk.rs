@@ -2,6 +2,7 @@
 
 use super::OCTANTS;
 use super::bounds::Bounds;
+use super::node::DENSE;
 use crate::lanes::words::transpose_bits;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, map3};
 use crate::ray::slab::Interval;
@@ -50,7 +51,7 @@ pub struct Chunk<S> {
     pub flat: bool,
     /// Whether some `shift` is too large to compute with.
     pub steep: bool,
-    /// Sum of the directions.
+    /// Sum of the directions (closest-hit, of at least [`DENSE`] rays).
     pub mean: [S; 3],
     /// Number of rays.
     pub len: usize,
@@ -106,9 +107,9 @@ fn store3<V: Lanes>(from: Lanes3<V>, to: &mut [[V::Scalar; RAYS]; 3], at: usize)
 }
 
 impl<S: Real> Chunk<S> {
-    /// Takes at most [`RAYS`] rays from a batch, which is not empty; the ends of their segments go to `t`.
+    /// Takes at most [`RAYS`] rays from a batch, which is not empty; the ends of their segments go to `t`. `ANY`: for any-hit.
     #[inline(always)]
-    pub fn gather<V: Lanes<Scalar = S>>(&mut self, rays: &Rays<S>, ids: &[u32], t: &mut [S; RAYS]) {
+    pub fn gather<V: Lanes<Scalar = S>, const ANY: bool>(&mut self, rays: &Rays<S>, ids: &[u32], t: &mut [S; RAYS]) {
         self.start(ids.len());
         // Columns of one known length, so that a ray's number is looked at once instead of eight times.
         let n = rays.padded_len();
@@ -134,12 +135,12 @@ impl<S: Real> Chunk<S> {
             self.put(at, &Packet::new(org, dir, V::load(&self.t_min[at..])));
         }
         self.bounds = Some(Bounds::of::<V>(self, t));
-        self.finish::<V>();
+        self.finish::<V, ANY>(Set::MAX);
     }
 
     /// The rays of `from` that meet an instance's box before `t`, in its space and at the same places. Returns which.
     #[inline(always)]
-    pub fn enter<V: Lanes<Scalar = S>>(
+    pub fn enter<V: Lanes<Scalar = S>, const ANY: bool>(
         &mut self,
         from: &Self,
         instance: &Instance<S>,
@@ -159,7 +160,7 @@ impl<S: Real> Chunk<S> {
             for at in (0..self.len).step_by(V::N) {
                 inside |= self.enter_vector::<V>(from, instance, t, at, (rays >> at) as u32 & V::ALL);
             }
-            self.finish::<V>();
+            self.finish::<V, ANY>(inside);
         }
         inside
     }
@@ -201,10 +202,12 @@ impl<S: Real> Chunk<S> {
         self.put(at, packet);
     }
 
-    /// Sums up what was taken in.
+    /// Sums up what was taken in, if the order of boxes is to be told for so many `rays` at once.
     #[inline(always)]
-    pub fn finish<V: Lanes<Scalar = S>>(&mut self) {
-        self.mean = self.sum_of_directions::<V>();
+    pub fn finish<V: Lanes<Scalar = S>, const ANY: bool>(&mut self, rays: Set) {
+        if !ANY && rays.count_ones() >= DENSE {
+            self.mean = self.sum_of_directions::<V>();
+        }
     }
 
     /// About that: entries after the last ray count too, as far as the vectors go.

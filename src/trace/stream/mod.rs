@@ -269,7 +269,7 @@ impl<S: Real> Job<'_, S> {
                 // Chunks of nearly equal sizes.
                 let (ids, others) = rest.split_at(rest.len().div_ceil(rest.len().div_ceil(RAYS)));
                 rest = others;
-                chunk.gather::<V>(self.rays, ids, &mut best.t);
+                chunk.gather::<V, ANY>(self.rays, ids, &mut best.t);
                 best.start();
                 let (stack, counters) = (&mut *self.stack, &mut *self.counters);
                 let (waiting, closer) = (&mut *waiting, &mut *closer);

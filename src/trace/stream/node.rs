@@ -7,7 +7,7 @@ use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::slab::{Interval, PAD, pad};
 
 /// From this many rays on they are tested as vectors.
-const DENSE: u32 = 48;
+pub const DENSE: u32 = 48;
 
 /// Which rays meet which child.
 pub struct Met<S> {
@@ -237,10 +237,15 @@ mod tests {
             }
             let ids: Vec<u32> = (0..RAYS as u32).collect();
             let (mut chunk, mut t) = (Chunk::default(), [V::Scalar::ZERO; RAYS]);
-            chunk.gather::<V>(&rays, &ids, &mut t);
+            chunk.gather::<V, false>(&rays, &ids, &mut t);
             steep += u32::from(chunk.steep);
             // A direction of zero points up, whatever the octant.
-            let of_octant = chunk.octants(Set::MAX)[octant];
+            let (mut rest, mut of_octant) = (Set::MAX, 0);
+            while rest != 0 {
+                let (own, alike) = chunk.first_octant(rest);
+                of_octant |= if own == octant { alike } else { 0 };
+                rest &= !alike;
+            }
             let planes = map3(planes(&node, octant), |(near, far)| {
                 (<V::Scalar as Real>::Octo::load(near), <V::Scalar as Real>::Octo::load(far))
             });

@@ -57,7 +57,7 @@ impl<S: Real> Visitors<S> {
     ) {
         let Self { chunk, best, waiting, closer, rays } = self;
         chunk.len = vectors * V::N;
-        chunk.finish::<V>();
+        chunk.finish::<V, ANY>(*rays);
         let mut walk = Walk { best, waiting, closer, stack, counters };
         walk.octants::<V, ANY, COUNT>(object, inst, chunk, *rays);
     }

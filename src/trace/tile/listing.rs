@@ -10,9 +10,6 @@ use super::{GROUPS, SET, SETS, V};
 use crate::lanes::words::{Columns, list_bits, words_with_bit};
 use crate::lanes::{LaneMask, Lanes, each};
 
-/// What a set costs with one triangle, where a group costs one with all triangles.
-const SET_COST: u32 = 1;
-
 /// The groups that meet triangles, and which.
 #[derive(Clone, Debug)]
 pub struct Listing {
@@ -64,7 +61,8 @@ impl Listing {
             }
         }
         (self.len, self.pairs) = (0, 0);
-        if any.count_ones() <= SET_COST * some.iter().map(|some| some.count_ones()).sum::<u32>() {
+        // A group costs with all triangles what a set costs with one; half or twice as much makes no difference.
+        if any.count_ones() <= some.iter().map(|some| some.count_ones()).sum::<u32>() {
             self.by_groups::<EXACT>(&wanted, any, groups, planes);
         } else {
             for (q, some) in some.into_iter().enumerate().take(N) {
