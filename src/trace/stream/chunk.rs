@@ -1,6 +1,5 @@
 //! A chunk of rays of one octant as structures of arrays, and what they have found.
 
-use super::OCTANTS;
 use super::bounds::Bounds;
 use super::node::DENSE;
 use crate::lanes::words::transpose_bits;
