@@ -17,6 +17,7 @@ mod column;
 mod ftz;
 pub mod functions;
 mod isa;
+pub mod marks;
 mod moved;
 mod pages;
 mod pair;

@@ -2,7 +2,7 @@
 
 use super::chunk::{Chunk, RAYS, Set};
 use crate::bvh::{Node, WIDTH};
-use crate::lanes::words::Marks;
+use crate::lanes::marks::Marks;
 use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::slab::{Interval, PAD, pad};
 

@@ -7,7 +7,8 @@ use super::batch::{BATCH, Planes};
 use super::groups::Groups;
 use super::own::own_depth;
 use super::{GROUPS, SET, SETS, V};
-use crate::lanes::words::{Columns, list_bits, words_with_bit};
+use crate::lanes::marks::{Columns, words_with_bit};
+use crate::lanes::words::list_bits;
 use crate::lanes::{LaneMask, Lanes, each};
 
 /// The groups that meet triangles, and which.
