@@ -11,7 +11,7 @@ use crate::lanes::{LaneMask, Lanes, Lanes3};
 pub struct Verdict {
     /// Some ray hit the triangle.
     pub hit: bool,
-    /// Some ray passes an edge within its rounding, or its best hit is as near: for [`pair_doubtful`].
+    /// Some ray passes an edge within its rounding, or its best hit is as near: for [`super::own::pair_doubtful`].
     pub doubt: bool,
 }
 
