@@ -4,16 +4,16 @@ mod common;
 mod solid_support;
 
 use common::Random;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use lanecast::lanes::Real;
 use lanecast::ray::{Hits, Rays};
 use lanecast::reference::{EngineHit, Oracle, OracleRay, Tally};
-use lanecast::scene::description::{Description, Precision};
+use lanecast::scene::description::{Description, Precision, Shape};
 use lanecast::scene::solids::{NodeKind, Placed, Solid, SolidTree};
 use lanecast::scene::world::{Preset, World};
 use lanecast::trace::{Engines, Scratch};
 use rayon::prelude::*;
-use solid_support::{KINDS, grow, rays, scene};
+use solid_support::{KINDS, cuboid, grow, leaf, rays, scene};
 
 fn oracle_ray<S: Real>(rays: &Rays<S>, i: usize) -> OracleRay {
     let v = |p: [S; 3]| DVec3::from_array(p.map(Real::to_f64));
@@ -64,16 +64,23 @@ fn all<S: Engines>(precision: Precision, kinds: usize, seeds: std::ops::Range<u6
 
 /// The sum over random trees, all of whose rays must be explained.
 fn trees<S: Engines>(precision: Precision, kinds: usize, seeds: std::ops::Range<u64>, n: usize) -> Tally {
-    let tallies: Vec<(u64, Tally)> = seeds
-        .into_par_iter()
-        .map(|seed| {
-            let mut r = Random(seed);
-            let mut tree = SolidTree::new("random");
-            let root = grow(&mut tree, &mut r, 1 + (seed % 8) as usize, kinds);
-            tree.root = root;
-            (seed, judged::<S>(&scene(tree), n, seed, precision))
-        })
-        .collect();
+    sum_over::<S>(precision, seeds, n, |seed| {
+        let mut r = Random(seed);
+        let mut tree = SolidTree::new("random");
+        tree.root = grow(&mut tree, &mut r, 1 + (seed % 8) as usize, kinds);
+        tree
+    })
+}
+
+/// The sum over the solids of some seeds, all of whose rays must be explained.
+fn sum_over<S: Engines>(
+    precision: Precision,
+    seeds: std::ops::Range<u64>,
+    n: usize,
+    solid: impl Fn(u64) -> SolidTree + Sync,
+) -> Tally {
+    let tallies: Vec<(u64, Tally)> =
+        seeds.into_par_iter().map(|seed| (seed, judged::<S>(&scene(solid(seed)), n, seed, precision))).collect();
     let mut sum = Tally::default();
     for (seed, tally) in &tallies {
         if !tally.is_clean() {
@@ -81,7 +88,7 @@ fn trees<S: Engines>(precision: Precision, kinds: usize, seeds: std::ops::Range<
         }
         sum.merge(tally);
     }
-    println!("{precision:?}, {kinds} kinds: {sum}");
+    println!("{precision:?}: {sum}");
     assert!(sum.is_clean(), "{} unexplained", sum.unexplained);
     sum
 }
@@ -110,13 +117,37 @@ fn elliptic_tori<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, 
         }
         tree
     };
-    let tallies: Vec<Tally> =
-        seeds.into_par_iter().map(|seed| judged::<S>(&scene(tori(seed)), n, seed, precision)).collect();
-    let mut sum = Tally::default();
-    tallies.iter().for_each(|tally| sum.merge(tally));
-    println!("{precision:?}, elliptic tori: {sum}");
+    let sum = sum_over::<S>(precision, seeds, n, tori);
     assert!(sum.hits > sum.rays / 8, "only {} of {} rays hit", sum.hits, sum.rays);
-    assert!(sum.is_clean(), "{} unexplained", sum.unexplained);
+}
+
+/// One operation over many small convex leaves, flush with each other and with the faces of a block: a block less all of them, or
+/// what is in either. The first boundary of such a solid is not found by a sweep.
+fn many_leaves<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, n: usize) {
+    let solid = |seed: u64| {
+        let mut r = Random(seed);
+        let mut tree = SolidTree::new("many");
+        let block = tree.solid(cuboid(DVec3::splat(-2.0), DVec3::splat(2.0)));
+        let mut list = vec![block];
+        let count = [30, 60, 120, 300][seed as usize % 4];
+        while list.len() < count {
+            let mut small = leaf(&mut r, 8);
+            // It would leave little of the rest.
+            if matches!(small.solid, Solid::Shape(Shape::HalfSpace)) {
+                continue;
+            }
+            let to = (r.in_cube() * 10.0).round() / 4.0;
+            small.transform =
+                DAffine3::from_translation(to) * DAffine3::from_scale(DVec3::splat(0.25)) * small.transform;
+            list.push(tree.solid(small));
+        }
+        let is_union = seed % 8 > 5;
+        list.drain(..usize::from(is_union));
+        tree.op(if is_union { NodeKind::Union(list) } else { NodeKind::Difference(list) });
+        tree
+    };
+    let sum = sum_over::<S>(precision, seeds, n, solid);
+    assert!(sum.hits > sum.rays / 4, "only {} of {} rays hit", sum.hits, sum.rays);
 }
 
 /// Trees whose rays run in the faces of meshes, meet tips and edges of no width, and rims edge-on: among all of the long
@@ -139,6 +170,16 @@ fn elliptic_tori_f64() {
 #[test]
 fn elliptic_tori_f32() {
     elliptic_tori::<f32>(Precision::F32, 0..size().0, size().1);
+}
+
+#[test]
+fn many_leaves_f64() {
+    many_leaves::<f64>(Precision::F64, 0..size().0, size().1);
+}
+
+#[test]
+fn many_leaves_f32() {
+    many_leaves::<f32>(Precision::F32, 0..size().0, size().1);
 }
 
 #[test]

@@ -251,8 +251,8 @@ impl<S: Real> Solid<S> {
         let leaf_is_all = self.tree.nodes.len() == 1 && self.leaves.len() == 1 && !self.tree.leaves[0].negated;
         self.is_sole = leaf_is_all && self.leaves[0].clip == self.bounds;
         self.front = self.front_share();
-        // Not where leaves are searched: there boundaries were lost (results/NOTES.md, last section).
-        let listed = |kind: Kind| self.search.is_none() && !matches!(kind, Kind::Mesh(_));
+        // In trees places are looked at one by one, so lines must pass through leaves at most once.
+        let listed = |kind: Kind| kind.is_span() || self.search.is_none() && !matches!(kind, Kind::Mesh(_));
         if self.leaves.iter().all(|leaf| listed(leaf.kind)) {
             let operation = Operation::of(&self.tree, |leaf| self.leaves[leaf].clip == self.bounds);
             self.operation = operation.map(Box::new);

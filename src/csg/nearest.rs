@@ -39,10 +39,10 @@ impl<S: Real> Operands<S> {
             }
             // Few operands are kept in registers, all pairs of their events are compared.
             match self.count {
-                1 => self.find_from::<1>(first, here),
-                2 => self.find_from::<2>(first, here),
-                3 => self.find_from::<3>(first, here),
-                _ => self.find_from::<0>(first, here),
+                1 => self.find_from::<1>(first, here, is_complete),
+                2 => self.find_from::<2>(first, here, is_complete),
+                3 => self.find_from::<3>(first, here, is_complete),
+                _ => self.find_from::<0>(first, here, is_complete),
             }
             if is_complete && self.together >> first & here != 0 {
                 self.tell(first);
@@ -52,7 +52,7 @@ impl<S: Real> Operands<S> {
 
     /// The same for the vector of lanes from `first` on. `N`: how many operands there are, or 0 for any number.
     #[inline(always)]
-    fn find_from<const N: usize>(&mut self, first: usize, lanes: u32) {
+    fn find_from<const N: usize>(&mut self, first: usize, lanes: u32, is_complete: bool) {
         let load = |from: &[S; MAX_LANES]| S::Wide::load(&from[first..]);
         let (earliest, limit, eps) = (load(&self.earliest), load(&self.limit), load(&self.eps));
         let place = |i: usize, end: usize| {
@@ -115,7 +115,9 @@ impl<S: Real> Operands<S> {
         let crosses = leaves | (counts(start.t) & start.t.cmp_lt(last.t));
         let crosses = crosses & found.t.cmp_le(limit);
         let apart = eps + eps;
-        let mut together = if N == 0 { !none } else { self.has_neighbours::<N>(first, apart) };
+        // Alone where the lane begins is one event only if all operands are listed.
+        let alone = N > 0 && is_complete;
+        let mut together = if alone { self.has_neighbours::<N>(first, apart) } else { !none };
         if together.bits() & lanes != 0 {
             let matters = (crosses & self.is_crowded(first, found.t, apart)) | self.begins_at(first, earliest, apart);
             together = together & matters;

@@ -118,11 +118,11 @@ impl<S: Real> Operands<S> {
         while moves {
             moves = false;
             for met in &mut search.met {
-                let lanes = lanes & met.lanes & place.cmp_le(last).bits();
+                let here = lanes & met.lanes & place.cmp_le(last).bits();
                 if met.operand == Met::UNSEEN {
                     let within = search.intervals.get::<V>(met.at);
                     let holds = (within.near - slack).cmp_le(place) & place.cmp_le(within.far + slack);
-                    if holds.bits() & lanes == 0 {
+                    if holds.bits() & here == 0 {
                         continue;
                     }
                     self.see(solid, operation, packet, met, (&within, eps));
@@ -134,7 +134,7 @@ impl<S: Real> Operands<S> {
                     let [begin, end, ..] = &self.spans[met.operand as usize];
                     let end = V::load(end);
                     let inside = V::load(begin).cmp_le(place) & place.cmp_lt(end);
-                    if inside.bits() & lanes != 0 {
+                    if inside.bits() & here != 0 {
                         place = V::select(inside, end, place);
                         moves = true;
                     }

@@ -9,12 +9,12 @@ use crate::math::Random;
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
 
-/// A leaf: often with faces in the planes of others.
-fn leaf(r: &mut Random, size: f64) -> LeafInput<'static> {
+/// A leaf: often with faces in the planes of others. `once`: lines pass through it at most once.
+fn leaf(r: &mut Random, size: f64, once: bool) -> LeafInput<'static> {
     let convex = [Form::Cuboid, Form::Sphere, Form::Cylinder, Form::Cone(0.5), Form::Cuboid];
     let others =
         [Form::Torus(0.4), Form::EllipticTorus([0.5, 0.2]), Form::Round([0.1, -0.5, 1.0]), Form::Taper([0.5, 1.5])];
-    let form = if r.below(4) == 0 { others[r.below(4)] } else { convex[r.below(5)] };
+    let form = if r.below(4) == 0 && !once { others[r.below(4)] } else { convex[r.below(5)] };
     let snapped = r.below(2) == 0;
     let snap = |v: DVec3| if snapped { (v * 4.0).round() / 4.0 } else { v };
     let scale = snap(DVec3::splat(0.25) + r.cube().abs() * size).max(DVec3::splat(0.25));
@@ -31,7 +31,9 @@ fn leaf(r: &mut Random, size: f64) -> LeafInput<'static> {
 
 /// One operation over `count` leaves, each as it is or its outside.
 fn solid<S: Real>(r: &mut Random, count: usize) -> Vec<Solid<S>> {
-    let mut leaves: Vec<_> = (0..count).map(|_| leaf(r, if count > 20 { 0.4 } else { 1.5 })).collect();
+    // Among many leaves first boundaries are found directly only if lines pass through all at most once.
+    let many = count > 20;
+    let mut leaves: Vec<_> = (0..count).map(|_| leaf(r, if many { 0.4 } else { 1.5 }, many)).collect();
     let op = if r.below(3) == 0 { Op::Union } else { Op::Intersection };
     // Without these most would be nothing, or everything.
     let whole = if op == Op::Union { 0 } else { 1 + r.below(2) };
@@ -50,7 +52,7 @@ fn solid<S: Real>(r: &mut Random, count: usize) -> Vec<Solid<S>> {
 
 /// Groups of leaves, each one operation, in another one.
 fn nested<S: Real>(r: &mut Random, count: usize) -> Vec<Solid<S>> {
-    let mut leaves: Vec<_> = (0..count).map(|_| leaf(r, 1.5)).collect();
+    let mut leaves: Vec<_> = (0..count).map(|_| leaf(r, 1.5, false)).collect();
     let ops = [Op::Union, Op::Intersection, Op::Difference];
     let (mut program, mut in_group, mut groups) = (Vec::new(), 0, 0);
     for i in 0..count {
@@ -126,9 +128,11 @@ fn packet<V: Lanes>(r: &mut Random) -> (Packet<V>, V) {
 
 fn check<V: Lanes>(seed: u64) {
     let mut r = Random(seed);
-    let (mut hits, mut direct) = (0, 0);
+    let (mut hits, mut direct, mut searched) = (0, 0, 0);
     for round in 0..3600 {
-        let count = [2, 2, 3, 4, 7, 40, 4, 6, 9][round % 9];
+        // So many leaves that only a share of each line is looked at first.
+        let many = if round % 4 == 0 { 300 } else { 40 };
+        let count = [2, 2, 3, 4, 7, many, 4, 6, 9][round % 9];
         let solids = if round % 9 < 6 { solid::<V::Scalar>(&mut r, count) } else { nested(&mut r, count) };
         for solid in solids {
             for _ in 0..20 {
@@ -139,10 +143,12 @@ fn check<V: Lanes>(seed: u64) {
                 assert_eq!(first, all, "{round}: {count} leaves, {packet:?}, to {limit:?}");
                 hits += all.iter().flatten().count();
                 direct += usize::from(solid.operation.is_some() && effort.steps == 1 && effort.events > 0);
+                searched += usize::from(solid.operation.is_some() && solid.search.is_some() && effort.events > 0);
             }
         }
     }
     assert!(hits > 3000 && direct > 1000, "{hits} hits, {direct} packets without a sweep");
+    assert!(searched > 1000, "{searched} packets among many leaves");
 }
 
 #[test]

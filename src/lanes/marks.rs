@@ -119,15 +119,7 @@ impl Columns {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A small linear congruential generator: enough to shuffle bits.
-    fn numbers() -> impl FnMut() -> u32 {
-        let mut state = 12345u64;
-        move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 32) as u32
-        }
-    }
+    use crate::lanes::tests::numbers;
 
     #[test]
     fn columns_are_set_where_they_are_wanted() {

@@ -2,6 +2,15 @@
 
 use super::*;
 
+/// A small linear congruential generator: enough to shuffle bits.
+pub(super) fn numbers() -> impl FnMut() -> u32 {
+    let mut state = 12345u64;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 32) as u32
+    }
+}
+
 /// Numbers that find the traps: signs, zeros, denormals, infinities, NaN.
 const HARD: [f64; 12] =
     [0.0, -0.0, 1.0, -1.0, 1.5, -3.25, 1e-40, -1e-40, 3e38, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
