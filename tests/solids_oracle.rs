@@ -129,7 +129,7 @@ fn many_leaves<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, n:
         let mut tree = SolidTree::new("many");
         let block = tree.solid(cuboid(DVec3::splat(-2.0), DVec3::splat(2.0)));
         let mut list = vec![block];
-        let count = [30, 60, 120, 300][seed as usize % 4];
+        let count = [30, 60, 300, 1000][seed as usize % 4];
         while list.len() < count {
             let mut small = leaf(&mut r, 8);
             // It would leave little of the rest.
