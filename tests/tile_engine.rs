@@ -292,6 +292,38 @@ fn needles(n: u32, r: &mut Random) -> Mesh {
     mesh
 }
 
+/// Weights of triangles so small, seen from so far, that f32 has few digits for them: those of the hit's place, as far as corners
+/// and rays are known, and never beyond a corner.
+#[test]
+fn weights_of_tiny_triangles() {
+    let mut r = Random(41);
+    let (mut hits, mut scratch, mut count, mut worst) = (Hits::default(), Scratch::default(), 0, 0.0f64);
+    for size in [3e-5, 1e-4, 3e-4] {
+        let mut mesh = Mesh::default();
+        for i in 0..2000u32 {
+            let at = r.in_cube() * DVec3::new(0.01, 0.01, 1.0);
+            mesh.positions.extend([(); 3].map(|()| (at + size * r.in_cube()).as_vec3().as_dvec3()));
+            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+        }
+        let scene = compile(vec![mesh.clone()]);
+        let rays = camera(DVec3::new(0.0, 0.0, 10.0), DVec3::ZERO, 1e-3, 512);
+        find("tile").intersect(&scene, &rays, &mut hits, &mut scratch, None);
+        for i in (0..rays.len()).filter(|&i| hits.is_hit(i)) {
+            let [a, b, c] = mesh.triangles[hits.prim[i] as usize].map(|v| mesh.positions[v as usize]);
+            let (u, v) = (f64::from(hits.u[i]), f64::from(hits.v[i]));
+            let [org, dir] = [rays.org(i), rays.dir(i)].map(|p| DVec3::from_array(p.map(f64::from)));
+            let from_eye = a + u * (b - a) + v * (c - a) - org;
+            let beside = from_eye.cross(dir).length() / dir.length();
+            worst = worst.max(beside / from_eye.length());
+            assert!(u >= 0.0 && v >= 0.0 && u + v <= 1.0 + 1e-6, "{u} {v}");
+            count += 1;
+        }
+    }
+    let half_ulps = worst / f64::from(f32::EPSILON / 2.0);
+    println!("{count} hits, at most {half_ulps:.3} half ulps of the distance beside the ray");
+    assert!(count > 10_000 && half_ulps < 1.0, "{count} hits, {half_ulps} half ulps");
+}
+
 /// Rooms whose walls are mirrors, with things in them that are not flat: of what a wall throws back most has a common point
 /// behind the wall.
 #[test]

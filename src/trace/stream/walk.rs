@@ -206,20 +206,30 @@ impl<S: Real> Walk<'_, S> {
     #[inline(always)]
     fn choose<const ANY: bool>(&mut self, node: &Node<S>, met: &node::Met<S>, fetch: &impl Fn(Child)) -> (Child, Set) {
         let last = met.children.count_ones() as usize - 1;
+        let places = &mut self.waiting.room()[..WIDTH];
+        let mut rest = met.children;
+        if ANY {
+            // In the node's own order, large children first.
+            for place in places.iter_mut().take(last) {
+                let slot = rest.ilog2() as usize & (WIDTH - 1);
+                rest &= !(1 << slot);
+                let child = node.child(slot);
+                fetch(child);
+                *place = Waiting { rays: met.rays(slot), near: S::ZERO, bound: false, child };
+            }
+            self.waiting.len += last;
+            let slot = rest.trailing_zeros() as usize & (WIDTH - 1);
+            fetch(node.child(slot));
+            return (node.child(slot), met.rays(slot));
+        }
         // No NaNs, so that no two children get one place.
         let near = S::Octo::load(&met.near).fast_max(S::Octo::splat(S::LOWEST));
         let farther: [u32; WIDTH] = std::array::from_fn(|slot| {
             let before = (1 << slot) - 1;
-            if ANY {
-                // In the node's own order, large children first.
-                return !before << 1;
-            }
             let own = S::Octo::splat(met.near[slot]).fast_max(S::Octo::splat(S::LOWEST));
             own.cmp_lt(near).bits() & !before | own.cmp_le(near).bits() & before
         });
-        let places = &mut self.waiting.room()[..WIDTH];
         let mut next = 0;
-        let mut rest = met.children;
         while rest != 0 {
             let slot = rest.trailing_zeros() as usize & (WIDTH - 1);
             rest &= rest - 1;
