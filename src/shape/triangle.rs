@@ -194,7 +194,8 @@ impl Triangle {
         let sound = V::constant(Self::least_det::<V::Scalar>()).cmp_le(size) & size.cmp_le(V::splat(V::Scalar::MAX));
         let doubtful = (found.hit & !sound).bits();
         if doubtful != 0 {
-            found = Self::restart(packet, &numbers, found, doubtful);
+            // Copies: a packet that is only made for this test stays in registers.
+            found = Self::restart(&[packet.org, packet.dir], &numbers, found, doubtful);
         }
         let mut end = interval.far;
         if flat {
@@ -226,11 +227,11 @@ impl Triangle {
     }
 
     /// Lanes whose edge functions under- or overflowed, one by one in f64 and scaled to unit size. Rare: tiny or
-    /// huge coordinates, and triangles seen exactly edge-on (which are misses).
+    /// huge coordinates, and triangles seen exactly edge-on (which are misses). `lines`: origins and directions.
     #[cold]
     #[inline(never)]
     fn restart<V: Lanes>(
-        packet: &Packet<V>,
+        lines: &[Lanes3<V>; 2],
         numbers: &impl Fn(usize) -> [V::Scalar; 9],
         mut found: Candidate<V>,
         lanes: u32,
@@ -241,7 +242,7 @@ impl Triangle {
                 continue;
             }
             let read = |v: [V; 3]| DVec3::from_array(v.map(|x| x.lane(lane).to_f64()));
-            let (org, dir) = (read(packet.org), read(packet.dir));
+            let [org, dir] = lines.map(read);
             if let Some((t, u, v)) = edge_test_f64(org, dir, Self::corners(&numbers(lane))) {
                 let only = V::Mask::from_bits(1 << lane);
                 let put = |x: f64, old: V| V::select(only, V::constant(x), old);

@@ -224,18 +224,16 @@ impl<S: Real> Walk<'_, S> {
         }
         // No NaNs, so that no two children get one place.
         let near = S::Octo::load(&met.near).fast_max(S::Octo::splat(S::LOWEST));
-        let farther: [u32; WIDTH] = std::array::from_fn(|slot| {
-            let before = (1 << slot) - 1;
-            let own = S::Octo::splat(met.near[slot]).fast_max(S::Octo::splat(S::LOWEST));
-            own.cmp_lt(near).bits() & !before | own.cmp_le(near).bits() & before
-        });
         let mut next = 0;
         while rest != 0 {
             let slot = rest.trailing_zeros() as usize & (WIDTH - 1);
             rest &= rest - 1;
             let child = node.child(slot);
             fetch(child);
-            let place = (farther[slot] & met.children).count_ones() as usize & (WIDTH - 1);
+            let before = (1 << slot) - 1;
+            let own = S::Octo::splat(met.near[slot]).fast_max(S::Octo::splat(S::LOWEST));
+            let farther = own.cmp_lt(near).bits() & !before | own.cmp_le(near).bits() & before;
+            let place = (farther & met.children).count_ones() as usize & (WIDTH - 1);
             next = if place == last { slot } else { next };
             places[place] = Waiting { rays: met.rays(slot), near: met.near[slot], bound: met.bound, child };
         }
