@@ -177,6 +177,13 @@ fn many_leaves_f64() {
     many_leaves::<f64>(Precision::F64, 0..size().0, size().1);
 }
 
+/// A line enters the block where a cylinder inside touches its face, 1e-13 before it enters that: of the long form's 10^7 rays
+/// the one that f64 tells apart more sharply than the oracle's own rounding.
+#[test]
+fn mantles_that_touch_faces() {
+    many_leaves::<f64>(Precision::F64, 1571..1572, 5000);
+}
+
 #[test]
 fn many_leaves_f32() {
     many_leaves::<f32>(Precision::F32, 0..size().0, size().1);

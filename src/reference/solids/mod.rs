@@ -124,7 +124,8 @@ impl Tree {
     }
 
     /// Boundaries of the whole on the line of `ray` (object space), in order; those closer than the tree's tolerance
-    /// plus `more` (distances in object space) are one.
+    /// plus `more` (distances in object space) are one. Below zero `more` also takes this floor's own rounding away: engines in
+    /// f64 tell apart what lies closer than that.
     pub fn boundaries(&self, ray: &OracleRay, more: f64) -> Vec<Boundary> {
         self.boundaries_each(ray, more, |_| *ray)
     }
@@ -147,7 +148,8 @@ impl Tree {
             }
         }
         ends.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.leaf.cmp(&b.leaf)));
-        let apart = (self.tolerance + more).max(OWN * size) / ray.dir.abs().max_element();
+        let least = if more < 0.0 { 0.0 } else { OWN * size };
+        let apart = (self.tolerance + more).max(least) / ray.dir.abs().max_element();
         let mut groups: Vec<&[End]> = Vec::new();
         let mut rest = ends.as_slice();
         while let Some(first) = rest.first() {
