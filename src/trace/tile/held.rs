@@ -68,47 +68,51 @@ impl Held {
         }
     }
 
-    /// Tests triangle `i`. `MANY`: it is of an instance.
+    /// Tests triangle `i`. `MANY`: it is of an instance. `EARLY`: some segment ends before the common point.
     ///
     /// With a common end (`END`, any-hit) rays start on surfaces, a few roundings in front of them. Depths from the far end
     /// cannot tell which side of its own surface a ray starts on; where the start lies with respect to the triangle's plane
     /// can. So it does where the common point is `BEHIND` the rays, and there it tells how far ahead they hit, too.
     #[inline(always)]
-    pub fn pair<const ANY: bool, const MANY: bool, const BEHIND: bool, const END: bool>(
+    pub fn pair<const ANY: bool, const MANY: bool, const BEHIND: bool, const END: bool, const EARLY: bool>(
         &mut self,
         planes: &Planes,
         i: usize,
         id: Id,
-        ends_early: bool,
     ) -> Verdict {
-        let infinite = V::splat(f32::INFINITY);
-        let Edges { mut possible, certain, weights } = edges([self.s, self.t], planes, i);
+        let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
+        let Edges { mut possible, mut certain, weights } = edges([self.s, self.t], planes, i);
         let depth = || own_depth(planes, i, linear([self.s, self.t], planes, i, 3));
+        // What is certain is possible, too, so one maximum is all that the next triangle waits for.
         if ANY && END {
-            let behind = behind(&self.start, planes, i);
-            possible = possible & V::constant(0.0).cmp_le(behind) & self.best.cmp_lt(infinite);
-            if ends_early {
-                possible = possible & depth().cmp_le(self.front);
+            let is_ahead = zero.cmp_le(behind(&self.start, planes, i));
+            (possible, certain) = (possible & is_ahead, certain & is_ahead);
+            if EARLY {
+                let is_ahead = depth().cmp_le(self.front);
+                (possible, certain) = (possible & is_ahead, certain & is_ahead);
             }
-            let hit = possible & certain;
-            self.best = select(hit, infinite, self.best);
-            return Verdict::of(hit, possible);
+            let waiting = self.best.cmp_lt(infinite);
+            self.best = select(certain, infinite, zero).fast_max(self.best);
+            return Verdict::of(certain & waiting, possible & waiting);
         }
         let inverse = depth();
-        possible = possible & self.best.cmp_le(inverse);
-        let mut ahead = V::constant(0.0);
+        let mut ahead = zero;
         if BEHIND {
             ahead = -behind(&self.start, planes, i);
-            possible = possible & V::constant(0.0).cmp_le(ahead);
-        } else if ends_early {
-            possible = possible & inverse.cmp_le(self.front);
+            let is_ahead = zero.cmp_le(ahead);
+            (possible, certain) = (possible & is_ahead, certain & is_ahead);
+        } else if EARLY {
+            let is_ahead = inverse.cmp_le(self.front);
+            (possible, certain) = (possible & is_ahead, certain & is_ahead);
         }
+        possible = possible & self.best.cmp_le(inverse);
         if ANY {
-            let hit = possible & certain;
-            self.best = select(hit, infinite, self.best);
+            let hit = certain & possible;
+            self.best = select(hit, infinite, zero).fast_max(self.best);
             return Verdict::of(hit, possible);
         }
-        let hit = possible & certain & self.best.cmp_lt(inverse);
+        let hit = certain & self.best.cmp_lt(inverse);
+        self.best = select(certain, inverse, zero).fast_max(self.best);
         self.prim = select(hit, V::splat(f32::from_bits(id.prim)), self.prim);
         if MANY {
             self.inst = select(hit, V::splat(f32::from_bits(id.inst)), self.inst);
@@ -116,7 +120,6 @@ impl Held {
         if BEHIND {
             self.ahead = select(hit, ahead * V::splat(planes.rcp[i]), self.ahead);
         }
-        self.best = select(hit, inverse, self.best);
         self.weights[0] = select(hit, weights[0], self.weights[0]);
         self.weights[1] = select(hit, weights[1], self.weights[1]);
         Verdict::of(hit, possible)

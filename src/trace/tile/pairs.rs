@@ -53,14 +53,21 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     listing.fill::<N, EXACT>(seen, &batch.groups, groups, planes);
     let to_end = ANY && matches!(exact.bundle.shared, Shared::End(_));
     let is_behind = !ANY && groups.is_behind;
-    let Tested { found, sets } = match (EXACT, groups.many, is_behind, to_end) {
-        (true, _, true, _) => test_exact::<ANY, true, COUNT>(memory, exact, counters),
-        (true, ..) => test_exact::<ANY, false, COUNT>(memory, exact, counters),
-        (_, true, _, true) => test::<ANY, true, false, true, COUNT>(memory, exact, counters),
-        (_, true, ..) => test::<ANY, true, false, false, COUNT>(memory, exact, counters),
-        (_, _, true, _) => test::<ANY, false, true, false, COUNT>(memory, exact, counters),
-        (.., true) => test::<ANY, false, false, true, COUNT>(memory, exact, counters),
-        _ => test::<ANY, false, false, false, COUNT>(memory, exact, counters),
+    let Tested { found, sets } = match (EXACT, is_behind) {
+        (true, true) => test_exact::<ANY, true, COUNT>(memory, exact, counters),
+        (true, false) => test_exact::<ANY, false, COUNT>(memory, exact, counters),
+        (false, true) if groups.many => test::<ANY, true, true, false, false, COUNT>(memory, exact, counters),
+        (false, true) => test::<ANY, false, true, false, false, COUNT>(memory, exact, counters),
+        (false, false) => match (groups.many, to_end, groups.ends_early) {
+            (true, true, true) => test::<ANY, true, false, true, true, COUNT>(memory, exact, counters),
+            (true, true, false) => test::<ANY, true, false, true, false, COUNT>(memory, exact, counters),
+            (true, false, true) => test::<ANY, true, false, false, true, COUNT>(memory, exact, counters),
+            (true, false, false) => test::<ANY, true, false, false, false, COUNT>(memory, exact, counters),
+            (false, true, true) => test::<ANY, false, false, true, true, COUNT>(memory, exact, counters),
+            (false, true, false) => test::<ANY, false, false, true, false, COUNT>(memory, exact, counters),
+            (false, false, true) => test::<ANY, false, false, false, true, COUNT>(memory, exact, counters),
+            (false, false, false) => test::<ANY, false, false, false, false, COUNT>(memory, exact, counters),
+        },
     };
     memory.batch.clear();
     memory.slabs.learn(memory.listing.pairs, found);
@@ -78,14 +85,20 @@ fn triangles(bits: u32) -> impl Iterator<Item = usize> {
 /// Tests the listed pairs. `MANY`: triangles are of instances. `BEHIND`: the common point is behind the rays. `END`: it is
 /// where they end.
 #[inline(always)]
-fn test<const ANY: bool, const MANY: bool, const BEHIND: bool, const END: bool, const COUNT: bool>(
+fn test<
+    const ANY: bool,
+    const MANY: bool,
+    const BEHIND: bool,
+    const END: bool,
+    const EARLY: bool,
+    const COUNT: bool,
+>(
     memory: &mut Memory,
     exact: &Exact,
     counters: &mut Counters,
 ) -> Tested {
     let Memory { groups, batch, planes, listing, again, .. } = memory;
     let id = |i: usize| Id { inst: batch.inst[i], prim: batch.id[i] };
-    let ends_early = groups.ends_early;
     let unsteady = if ANY { 0 } else { planes.unsteady };
     // What the plain test is not for comes last: which test is next is never a surprise.
     let odd = planes.wild | if BEHIND { planes.flat } else { 0 };
@@ -101,7 +114,7 @@ fn test<const ANY: bool, const MANY: bool, const BEHIND: bool, const END: bool, 
             if COUNT {
                 count_pair(held.best, counters);
             }
-            let Verdict { hit, doubt } = held.pair::<ANY, MANY, BEHIND, END>(planes, i, id(i), ends_early);
+            let Verdict { hit, doubt } = held.pair::<ANY, MANY, BEHIND, END, EARLY>(planes, i, id(i));
             hits |= u32::from(hit) << i;
             doubts |= u32::from(doubt) << i;
         }
