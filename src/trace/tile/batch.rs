@@ -23,7 +23,7 @@
 use super::edges::{Doubt, cross, cross_accurate, doubt, longest, minus, own_edges, sum};
 use super::groups::{Groups, splats};
 use super::place::Place;
-use super::{HALF_ULP, SETS, V, select};
+use super::{HALF_ULP, Mask, SETS, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, f32x8, map3};
 use crate::shape::Block;
 
@@ -266,38 +266,48 @@ impl Batch {
             self.set_up_side(groups, planes);
         }
         // Over the volume an edge function is positive on the side that faces the apex, and the corner's weight times 1/z.
-        let (edges, eps) = own_edges(groups, p);
+        let each_inverse = map3(*p, |q| one / q[2]);
+        let (edges, eps) = own_edges(groups, p, &each_inverse);
         let edges = map3(edges, |e| map3(e, |x| x * rcp));
         let size = volume.abs();
         let eps = map3(eps, |e| e * rcp.abs());
         // A corner beside or behind the apex sets no bound to what is nearest.
         let low = p[0][2].fast_min(p[1][2]).fast_min(p[2][2]);
         let high = p[0][2].fast_max(p[1][2]).fast_max(p[2][2]);
-        let nearest = select(zero.cmp_lt(low), one / low, V::splat(f32::MAX));
-        let farthest = one / high;
+        let [a, b, c] = each_inverse;
+        let nearest = select(zero.cmp_lt(low), a.fast_max(b).fast_max(c), V::splat(f32::MAX));
+        // Those that are not negative are of corners ahead of it.
+        let [a, b, c] = map3(each_inverse, |x| select(zero.cmp_lt(x), x, V::splat(f32::INFINITY)));
+        let farthest = a.fast_min(b).fast_min(c);
         nearest.store(&mut planes.nearest);
         farthest.store(&mut planes.farthest);
 
-        let most = sum(p[0]).fast_max(sum(p[1])).fast_max(sum(p[2])) * V::splat(MOST_SHIFT);
-        let mut steady = zero.cmp_lt(high);
-        for k in 0..3 {
-            // The edge's length as it is seen: its function's slope is that times the depth. An edge that is seen end-on
-            // moves far.
-            let seen = edges[k][0].abs().fast_max(edges[k][1].abs());
-            let near = (eps[k] * high).cmp_le(seen * most) | eps[k].cmp_lt(groups.smallest(&edges[k]));
-            steady = steady & near & (eps[k] * high).cmp_le(V::splat(1.0 / LEAST_SUM));
-        }
+        let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
+        planes.wild = in_front & !V::splat(LEAST_VOLUME).cmp_le(size).bits();
+        // Weights are for the nearest hit only.
+        planes.unsteady = if ANY { 0 } else { in_front & !steady(groups, p, (&edges, &eps), high).bits() };
         let eps = eps[0].fast_max(eps[1]).fast_max(eps[2]);
         (-eps).store(&mut planes.outside);
         eps.store(&mut planes.inside);
         planes.corners = map3(*p, |q| map3(q, V::to_array));
-        let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
-        planes.wild = in_front & !V::splat(LEAST_VOLUME).cmp_le(size).bits();
-        planes.unsteady = in_front & !steady.bits();
         let own = |inverse: V| nearest.fast_min(farthest.fast_max(inverse));
         let [e0, e1, e2] = edges;
         planes.store(groups, &[e0, e1, e2, map3(normal, |n| n * rcp)], eps, own) & in_front | planes.wild
     }
+}
+
+/// Triangles whose weights f32 tells well enough, by their edge functions, what may be wrong with these, and the depth of the farthest
+/// corner.
+#[inline(always)]
+fn steady(groups: &Groups, p: &[Lanes3<V>; 3], (edges, eps): (&[Lanes3<V>; 3], &[V; 3]), high: V) -> Mask {
+    let most = sum(p[0]).fast_max(sum(p[1])).fast_max(sum(p[2])) * V::splat(MOST_SHIFT);
+    let is_steady = |k: usize| {
+        // The edge's length as it is seen: its function's slope is that times the depth. An edge that is seen end-on moves far.
+        let seen = edges[k][0].abs().fast_max(edges[k][1].abs());
+        let near = (eps[k] * high).cmp_le(seen * most) | eps[k].cmp_lt(groups.smallest(&edges[k]));
+        near & (eps[k] * high).cmp_le(V::splat(1.0 / LEAST_SUM))
+    };
+    is_steady(0) & is_steady(1) & is_steady(2)
 }
 
 impl Planes {

@@ -1,6 +1,6 @@
 //! Edge functions of sixteen triangles in a tile's frame, and what rounding does to them.
 
-use super::groups::Groups;
+use super::groups::{Groups, splats};
 use super::{HALF_ULP, V, select};
 use crate::lanes::{Lanes, Lanes3, each, map3};
 
@@ -58,32 +58,32 @@ fn rounding(groups: &Groups, p: &[Lanes3<V>; 3]) -> V {
     spread * spread * V::splat(PRODUCTS) + V::splat(f32::MIN_POSITIVE)
 }
 
-/// The tile's own edge functions, unfaced, and their rounding errors for the corners as they are.
+/// The tile's own edge functions, unfaced, and their rounding errors for the corners as they are. `inverse`: the corners'
+/// reciprocal depths.
 ///
-/// They are made around a ray of the tile close to the triangle, so that what rounds is as large as the triangle, not
-/// as its distance from the tile's axis: with x', y' seen from that ray, `y1 z2 - z1 y2` is `y1' z2 - z1 y2'`.
+/// Each is made around the ray of the tile that is closest to the edge's first corner, so that what rounds is as large as the
+/// edge, not as the triangle or its distance from the tile's axis: with x', y' seen from that ray, `y1 z2 - z1 y2` is
+/// `y1' z2 - z1 y2'`.
 #[inline(always)]
-pub fn own_edges(groups: &Groups, p: &[Lanes3<V>; 3]) -> ([Lanes3<V>; 3], [V; 3]) {
+pub fn own_edges(groups: &Groups, p: &[Lanes3<V>; 3], inverse: &Lanes3<V>) -> ([Lanes3<V>; 3], [V; 3]) {
     let zero = V::constant(0.0);
-    let z0 = p[0][2];
-    let near_ray = |axis: usize| {
-        let [lo, hi] = [V::splat(groups.bounds[axis][0]), V::splat(groups.bounds[axis][1])];
-        lo.fast_max(hi.fast_min(select(zero.cmp_lt(z0), p[0][axis] / z0, zero)))
+    let [[s0, s1], [t0, t1]] = splats(&groups.bounds);
+    let edge = |i: usize, j: usize| {
+        let in_front = zero.cmp_lt(p[i][2]);
+        let within = |lo: V, hi: V, x: V| lo.fast_max(hi.fast_min(select(in_front, x * inverse[i], zero)));
+        let (s, t) = (within(s0, s1, p[i][0]), within(t0, t1, p[i][1]));
+        let seen = |q: &Lanes3<V>| [(-s).mul_add(q[2], q[0]), (-t).mul_add(q[2], q[1]), q[2]];
+        let (a, b) = (seen(&p[i]), seen(&p[j]));
+        let [x, y, at_ray] = cross(a, b);
+        let reach = |q: &Lanes3<V>| q[0].abs().fast_max(q[1].abs());
+        let (of_a, of_b) = (reach(&a), reach(&b));
+        let slope = of_a * b[2].abs() + of_b * a[2].abs();
+        let products = of_a * of_b * V::splat(OWN_PRODUCTS[1]) + V::splat(f32::MIN_POSITIVE);
+        let eps = slope.mul_add(V::splat(OWN_PRODUCTS[0] * groups.wide), products);
+        ([x, y, (-x).mul_add(s, (-y).mul_add(t, at_ray))], eps)
     };
-    let (s0, t0) = (near_ray(0), near_ray(1));
-    let seen = map3(*p, |q| [(-s0).mul_add(q[2], q[0]), (-t0).mul_add(q[2], q[1]), q[2]]);
-    let reach = map3(seen, |q| q[0].abs().fast_max(q[1].abs()));
-    let pairs = [(1, 2), (2, 0), (0, 1)];
-    let edges = map3(pairs, |(i, j)| {
-        let [x, y, at_ray] = cross(seen[i], seen[j]);
-        [x, y, (-x).mul_add(s0, (-y).mul_add(t0, at_ray))]
-    });
-    let eps = map3(pairs, |(i, j)| {
-        let slope = reach[i] * p[j][2].abs() + reach[j] * p[i][2].abs();
-        let products = reach[i] * reach[j] * V::splat(OWN_PRODUCTS[1]) + V::splat(f32::MIN_POSITIVE);
-        slope.mul_add(V::splat(OWN_PRODUCTS[0] * groups.wide), products)
-    });
-    (edges, eps)
+    let (a, b, c) = (edge(1, 2), edge(2, 0), edge(0, 1));
+    ([a.0, b.0, c.0], [a.1, b.1, c.1])
 }
 
 #[inline(always)]
