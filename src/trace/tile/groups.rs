@@ -369,9 +369,27 @@ impl Groups {
     #[inline(always)]
     pub fn refresh<const N: usize>(&mut self, sets: u32) {
         for q in (0..N).filter(|q| N == 1 || sets >> q & 1 != 0) {
-            let mut rows = [V::splat(0.0); SET];
-            rows.iter_mut().zip(&self.of[q * SET..]).for_each(|(row, group)| *row = group.inv_lo);
-            self.least[q] = row_minima(&rows);
+            let Some(of) = self.of[q * SET..].first_chunk::<SET>() else { continue };
+            // By their numbers: a loop over all would put them into memory first.
+            let row = |i: usize| of[i].inv_lo;
+            self.least[q] = row_minima(&[
+                row(0),
+                row(1),
+                row(2),
+                row(3),
+                row(4),
+                row(5),
+                row(6),
+                row(7),
+                row(8),
+                row(9),
+                row(10),
+                row(11),
+                row(12),
+                row(13),
+                row(14),
+                row(15),
+            ]);
             let waiting = self.least[q].cmp_lt(V::splat(f32::INFINITY));
             // A little farther than the reciprocal, whatever its rounding.
             let far = V::splat(1.0 + 4.0 * HALF_ULP) / self.least[q];
