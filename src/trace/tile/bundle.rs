@@ -1,6 +1,6 @@
 //! What the rays of a block have in common: the point they start from, or (any-hit) the point they end in.
 
-use super::{GROUPS, HALF_ULP, Mask, SET, V, select};
+use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::words::{greatest, prefetch};
 use crate::lanes::{Column, LaneMask, Lanes, Lanes3, each, map3};
 use crate::ray::{Packet, Pencil, Rays};
@@ -92,6 +92,20 @@ pub fn prefetch_rays(rays: &Rays<f32>, first: usize) {
     let [dx, dy, dz] = &rays.dir;
     for array in [x, y, z, dx, dy, dz, &rays.t_min, &rays.t_max] {
         prefetch(array, first);
+    }
+}
+
+/// Asks the memory for what is looked at first: the first groups, and the sample that the first block's frame is made of.
+pub fn prefetch_first(rays: &Rays<f32>) {
+    (0..AHEAD).for_each(|g| prefetch_rays(rays, g * V::N));
+    (0..GROUPS).for_each(|g| prefetch_sample(rays, 0, g));
+}
+
+/// Asks the memory for group `g` of the block that starts with ray `first`, if the block's frame is made of it.
+#[inline(always)]
+pub fn prefetch_sample(rays: &Rays<f32>, first: usize, g: usize) {
+    if g % SETS == 0 {
+        prefetch_rays(rays, first + g * V::N);
     }
 }
 

@@ -4,7 +4,7 @@ use super::bundle::{AHEAD, At, Bundle, Shared, Source, largest};
 use super::frame::Frame;
 use super::presumed::Look;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
-use crate::lanes::words::{greatest, least, row_minima};
+use crate::lanes::words::{greatest, least, row_minima, row_minima_of};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::math::Aabb;
 use crate::scene::world::World;
@@ -370,26 +370,7 @@ impl Groups {
     pub fn refresh<const N: usize>(&mut self, sets: u32) {
         for q in (0..N).filter(|q| N == 1 || sets >> q & 1 != 0) {
             let Some(of) = self.of[q * SET..].first_chunk::<SET>() else { continue };
-            // By their numbers: a loop over all would put them into memory first.
-            let row = |i: usize| of[i].inv_lo;
-            self.least[q] = row_minima(&[
-                row(0),
-                row(1),
-                row(2),
-                row(3),
-                row(4),
-                row(5),
-                row(6),
-                row(7),
-                row(8),
-                row(9),
-                row(10),
-                row(11),
-                row(12),
-                row(13),
-                row(14),
-                row(15),
-            ]);
+            self.least[q] = row_minima_of(|i| of[i].inv_lo);
             let waiting = self.least[q].cmp_lt(V::splat(f32::INFINITY));
             // A little farther than the reciprocal, whatever its rounding.
             let far = V::splat(1.0 + 4.0 * HALF_ULP) / self.least[q];

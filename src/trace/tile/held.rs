@@ -1,42 +1,223 @@
-//! One group at a time against set-up triangles, in registers: most of what a tile does.
+//! Set-up triangles against groups, in registers: most of what a tile does. Where many triangles meet few groups a group stays there
+//! ([`Held`]), where few meet many a triangle does ([`Plane`]).
 
 use super::batch::Planes;
 use super::groups::{Group, Groups, NO_SLOT};
-use super::own::{Edges, Id, behind, edges, linear, own_depth};
+use super::own::Id;
 use super::{Mask, V, select};
-use crate::lanes::{LaneMask, Lanes, Lanes3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each};
 
-/// What a pair of triangle and group came to.
+/// A group's rays and how far they look.
 #[derive(Clone, Copy, Debug)]
-pub struct Verdict {
-    /// Some ray hit the triangle.
-    pub hit: bool,
-    /// Some ray passes an edge within its rounding, or its best hit is as near: for [`super::own::pair_doubtful`].
-    pub doubt: bool,
-}
-
-impl Verdict {
-    /// `hit` of `possible` rays are certain.
-    #[inline(always)]
-    fn of(hit: Mask, possible: Mask) -> Self {
-        Self { hit: hit.any(), doubt: (possible & !hit).any() }
-    }
-}
-
-/// A group's rays and what they found, in registers while some triangles are tested against them.
-#[derive(Clone, Copy, Debug)]
-pub struct Held {
+pub struct Line {
     s: V,
     t: V,
     /// See [`Group::inv_lo`].
     pub best: V,
     /// See [`Group::inv_hi`].
     front: V,
-    weights: [V; 2],
     start: Lanes3<V>,
+}
+
+impl Line {
+    /// Group `g`.
+    #[inline(always)]
+    pub fn of(groups: &Groups, g: usize) -> Self {
+        let Group { s, t, inv_lo, inv_hi, start, .. } = groups.of[g];
+        Self { s, t, best: inv_lo, front: inv_hi, start }
+    }
+
+    #[inline(always)]
+    fn at(&self, [x, y, z]: Lanes3<V>) -> V {
+        x.mul_add(self.s, y.mul_add(self.t, z))
+    }
+}
+
+/// A triangle's edges against some rays.
+pub struct Edges {
+    /// Lanes not surely outside.
+    pub possible: Mask,
+    /// Lanes surely inside: possible, too.
+    pub certain: Mask,
+    /// Weights of the second and third corner, times 1/z.
+    weights: [V; 2],
+}
+
+/// What a triangle and a group came to.
+#[derive(Clone, Copy, Debug)]
+pub struct Met {
+    /// Lanes that hit the triangle.
+    hit: Mask,
+    /// Lanes that may: those that are no hits pass an edge within its rounding, or their best hit is as near.
+    possible: Mask,
+    /// New [`Line::best`].
+    best: V,
+    weights: [V; 2],
+    ahead: V,
+}
+
+impl Met {
+    /// Whether some ray hit the triangle.
+    #[inline(always)]
+    pub fn hit(&self) -> bool {
+        self.hit.any()
+    }
+
+    /// Whether it is for [`super::own::pair_doubtful`].
+    #[inline(always)]
+    pub fn doubt(&self) -> bool {
+        (self.possible & !self.hit).any()
+    }
+
+    /// A number, as bits of `old` where nothing was hit. Numbers are moved as floats: selection copies bits.
+    #[inline(always)]
+    fn name(&self, new: u32, old: V) -> V {
+        select(self.hit, V::splat(f32::from_bits(new)), old)
+    }
+}
+
+/// A set-up triangle, each number in all lanes; those that are not asked for are not read. See [`Planes`].
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    linear: [Lanes3<V>; 4],
+    outside: V,
+    inside: V,
+    nearest: V,
+    farthest: V,
+    corner: Lanes3<V>,
+    normal: Lanes3<V>,
+    rcp: V,
+}
+
+impl Plane {
+    /// Triangle `i`.
+    #[inline(always)]
+    pub fn of(planes: &Planes, i: usize) -> Self {
+        let linear = |k: usize| each(|x| V::splat(planes.linear[k][x][i]));
+        Self {
+            linear: [linear(0), linear(1), linear(2), linear(3)],
+            outside: V::splat(planes.outside[i]),
+            inside: V::splat(planes.inside[i]),
+            nearest: V::splat(planes.nearest[i]),
+            farthest: V::splat(planes.farthest[i]),
+            corner: each(|a| V::splat(planes.side[a][i])),
+            normal: each(|a| V::splat(planes.side[a + 3][i])),
+            rcp: V::splat(planes.rcp[i]),
+        }
+    }
+
+    /// 1/z where the triangle's plane says `inverse`: not nearer and not farther than its corners.
+    #[inline(always)]
+    pub fn within(&self, inverse: V) -> V {
+        self.nearest.fast_min(self.farthest.fast_max(inverse))
+    }
+
+    /// 1/z where some rays meet it.
+    #[inline(always)]
+    pub fn depth(&self, line: &Line) -> V {
+        self.within(line.at(self.linear[3]))
+    }
+
+    /// Its edges against some rays.
+    #[inline(always)]
+    pub fn edges(&self, line: &Line) -> Edges {
+        let (e0, e1, e2) = (line.at(self.linear[0]), line.at(self.linear[1]), line.at(self.linear[2]));
+        let least = e0.fast_min(e1).fast_min(e2);
+        Edges { possible: self.outside.cmp_le(least), certain: self.inside.cmp_le(least), weights: [e1, e2] }
+    }
+
+    /// How far segments begin behind its plane as seen from their common point; in some unit.
+    #[inline(always)]
+    pub fn behind(&self, line: &Line) -> V {
+        dot(self.normal, each(|a| line.start[a] - self.corner[a]))
+    }
+
+    /// Which part of the way from a common point behind the rays is ahead of their starts, `ahead` of the plane.
+    #[inline(always)]
+    pub fn share(&self, ahead: V) -> V {
+        ahead * self.rcp
+    }
+
+    /// Tests some rays. `EARLY`: some segment ends before the common point.
+    ///
+    /// With a common end (`END`, any-hit) rays start on surfaces, a few roundings in front of them. Depths from the far end
+    /// cannot tell which side of its own surface a ray starts on; where the start lies with respect to the triangle's plane
+    /// can. So it does where the common point is `BEHIND` the rays, and there it tells how far ahead they hit, too.
+    #[inline(always)]
+    pub fn meet<const ANY: bool, const BEHIND: bool, const END: bool, const EARLY: bool>(&self, line: &Line) -> Met {
+        let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
+        let Edges { mut possible, mut certain, weights } = self.edges(line);
+        let mut ahead = zero;
+        // What is certain is possible, too, so one maximum is all that the next triangle waits for.
+        if ANY && END {
+            let is_ahead = zero.cmp_le(self.behind(line));
+            (possible, certain) = (possible & is_ahead, certain & is_ahead);
+            if EARLY {
+                let is_ahead = self.depth(line).cmp_le(line.front);
+                (possible, certain) = (possible & is_ahead, certain & is_ahead);
+            }
+            let waiting = line.best.cmp_lt(infinite);
+            let best = select(certain, infinite, zero).fast_max(line.best);
+            return Met { hit: certain & waiting, possible: possible & waiting, best, weights, ahead };
+        }
+        let inverse = self.depth(line);
+        if BEHIND {
+            ahead = -self.behind(line);
+            let is_ahead = zero.cmp_le(ahead);
+            (possible, certain) = (possible & is_ahead, certain & is_ahead);
+        } else if EARLY {
+            let is_ahead = inverse.cmp_le(line.front);
+            (possible, certain) = (possible & is_ahead, certain & is_ahead);
+        }
+        possible = possible & line.best.cmp_le(inverse);
+        if ANY {
+            let hit = certain & possible;
+            let best = select(hit, infinite, zero).fast_max(line.best);
+            return Met { hit, possible, best, weights, ahead };
+        }
+        let hit = certain & line.best.cmp_lt(inverse);
+        let best = select(certain, inverse, zero).fast_max(line.best);
+        Met { hit, possible, best, weights, ahead }
+    }
+}
+
+impl Groups {
+    /// Stores what group `g` found in one triangle. `MANY`: it is of an instance.
+    #[inline(always)]
+    pub fn take<const ANY: bool, const MANY: bool, const BEHIND: bool>(
+        &mut self,
+        g: usize,
+        plane: &Plane,
+        met: &Met,
+        id: Id,
+    ) {
+        let group = &mut self.of[g];
+        let hit = met.hit;
+        group.inv_lo = select(hit, met.best, group.inv_lo);
+        if ANY {
+            return;
+        }
+        group.weights[0] = select(hit, met.weights[0], group.weights[0]);
+        group.weights[1] = select(hit, met.weights[1], group.weights[1]);
+        group.slot = bytemuck::cast(met.name(id.prim, V::new(bytemuck::cast(group.slot))).to_array());
+        if MANY {
+            self.inst[g] = bytemuck::cast(met.name(id.inst, V::new(bytemuck::cast(self.inst[g]))).to_array());
+        }
+        if BEHIND {
+            self.ahead[g] = select(hit, plane.share(met.ahead), self.ahead[g]);
+        }
+    }
+}
+
+/// A group and what it found, while some triangles are tested against it.
+#[derive(Clone, Copy, Debug)]
+pub struct Held {
+    /// Its rays.
+    pub line: Line,
+    weights: [V; 2],
     /// See [`Groups::ahead`].
     ahead: V,
-    // Numbers are moved as floats: selection copies bits.
+    // As floats: see [`Met::name`].
     prim: V,
     inst: V,
 }
@@ -45,17 +226,36 @@ impl Held {
     /// Loads a group.
     #[inline(always)]
     pub fn of<const MANY: bool>(groups: &Groups, g: usize) -> Self {
-        let Group { s, t, inv_lo, inv_hi, slot, weights, start, .. } = groups.of[g];
+        let Group { slot, weights, .. } = groups.of[g];
         let inst = if MANY { groups.inst[g] } else { [NO_SLOT; 16] };
         let (prim, inst) = (V::new(bytemuck::cast(slot)), V::new(bytemuck::cast(inst)));
-        Self { s, t, best: inv_lo, front: inv_hi, weights, start, ahead: groups.ahead[g], prim, inst }
+        Self { line: Line::of(groups, g), weights, ahead: groups.ahead[g], prim, inst }
+    }
+
+    /// Takes what it found in one triangle. `MANY`: it is of an instance.
+    #[inline(always)]
+    pub fn take<const ANY: bool, const MANY: bool, const BEHIND: bool>(&mut self, plane: &Plane, met: &Met, id: Id) {
+        let hit = met.hit;
+        self.line.best = met.best;
+        if ANY {
+            return;
+        }
+        self.prim = met.name(id.prim, self.prim);
+        if MANY {
+            self.inst = met.name(id.inst, self.inst);
+        }
+        if BEHIND {
+            self.ahead = select(hit, plane.share(met.ahead), self.ahead);
+        }
+        self.weights[0] = select(hit, met.weights[0], self.weights[0]);
+        self.weights[1] = select(hit, met.weights[1], self.weights[1]);
     }
 
     /// Stores what was found.
     #[inline(always)]
     pub fn put<const ANY: bool, const MANY: bool, const BEHIND: bool>(self, groups: &mut Groups, g: usize) {
         let group = &mut groups.of[g];
-        group.inv_lo = self.best;
+        group.inv_lo = self.line.best;
         if ANY {
             return;
         }
@@ -66,62 +266,5 @@ impl Held {
         if BEHIND {
             groups.ahead[g] = self.ahead;
         }
-    }
-
-    /// Tests triangle `i`. `MANY`: it is of an instance. `EARLY`: some segment ends before the common point.
-    ///
-    /// With a common end (`END`, any-hit) rays start on surfaces, a few roundings in front of them. Depths from the far end
-    /// cannot tell which side of its own surface a ray starts on; where the start lies with respect to the triangle's plane
-    /// can. So it does where the common point is `BEHIND` the rays, and there it tells how far ahead they hit, too.
-    #[inline(always)]
-    pub fn pair<const ANY: bool, const MANY: bool, const BEHIND: bool, const END: bool, const EARLY: bool>(
-        &mut self,
-        planes: &Planes,
-        i: usize,
-        id: Id,
-    ) -> Verdict {
-        let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
-        let Edges { mut possible, mut certain, weights } = edges([self.s, self.t], planes, i);
-        let depth = || own_depth(planes, i, linear([self.s, self.t], planes, i, 3));
-        // What is certain is possible, too, so one maximum is all that the next triangle waits for.
-        if ANY && END {
-            let is_ahead = zero.cmp_le(behind(&self.start, planes, i));
-            (possible, certain) = (possible & is_ahead, certain & is_ahead);
-            if EARLY {
-                let is_ahead = depth().cmp_le(self.front);
-                (possible, certain) = (possible & is_ahead, certain & is_ahead);
-            }
-            let waiting = self.best.cmp_lt(infinite);
-            self.best = select(certain, infinite, zero).fast_max(self.best);
-            return Verdict::of(certain & waiting, possible & waiting);
-        }
-        let inverse = depth();
-        let mut ahead = zero;
-        if BEHIND {
-            ahead = -behind(&self.start, planes, i);
-            let is_ahead = zero.cmp_le(ahead);
-            (possible, certain) = (possible & is_ahead, certain & is_ahead);
-        } else if EARLY {
-            let is_ahead = inverse.cmp_le(self.front);
-            (possible, certain) = (possible & is_ahead, certain & is_ahead);
-        }
-        possible = possible & self.best.cmp_le(inverse);
-        if ANY {
-            let hit = certain & possible;
-            self.best = select(hit, infinite, zero).fast_max(self.best);
-            return Verdict::of(hit, possible);
-        }
-        let hit = certain & self.best.cmp_lt(inverse);
-        self.best = select(certain, inverse, zero).fast_max(self.best);
-        self.prim = select(hit, V::splat(f32::from_bits(id.prim)), self.prim);
-        if MANY {
-            self.inst = select(hit, V::splat(f32::from_bits(id.inst)), self.inst);
-        }
-        if BEHIND {
-            self.ahead = select(hit, ahead * V::splat(planes.rcp[i]), self.ahead);
-        }
-        self.weights[0] = select(hit, weights[0], self.weights[0]);
-        self.weights[1] = select(hit, weights[1], self.weights[1]);
-        Verdict::of(hit, possible)
     }
 }

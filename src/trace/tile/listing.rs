@@ -5,42 +5,100 @@
 
 use super::batch::{BATCH, Planes};
 use super::groups::Groups;
-use super::own::own_depth;
+use super::held::Plane;
 use super::{GROUPS, SET, SETS, V};
-use crate::lanes::marks::{Columns, words_with_bit};
-use crate::lanes::words::list_bits;
+use crate::lanes::chosen::lanes_of;
+use crate::lanes::marks::words_with_bit;
 use crate::lanes::{LaneMask, Lanes, each};
 
-/// The groups that meet triangles, and which.
+/// The pairs of a triangle and a group that meet.
 #[derive(Clone, Debug)]
 pub struct Listing {
+    /// Listed group by group, else triangle by triangle.
+    pub by_groups: bool,
     /// By group: triangles, as bits. Only of those that are listed.
     triangles: [u16; GROUPS],
-    /// The groups; with room for a whole list at the end.
-    groups: [u8; GROUPS + SET],
+    /// The groups.
+    groups: [u8; GROUPS],
     len: usize,
-    /// Pairs of a group and a triangle.
+    /// By triangle: groups, as bits.
+    met: [u64; BATCH],
+    /// The triangles that some group meets, as bits.
+    seen: u32,
+    /// Pairs.
     pub pairs: usize,
 }
 
 impl Default for Listing {
     fn default() -> Self {
-        Self { triangles: [0; GROUPS], groups: [0; GROUPS + SET], len: 0, pairs: 0 }
+        Self {
+            by_groups: true,
+            triangles: [0; GROUPS],
+            groups: [0; GROUPS],
+            len: 0,
+            met: [0; BATCH],
+            seen: 0,
+            pairs: 0,
+        }
     }
 }
 
+/// The set bits of `bits`, each a triangle of a batch.
+#[inline(always)]
+pub fn triangles(bits: u32) -> impl Iterator<Item = usize> {
+    lanes_of(bits).map(|i| i & (BATCH - 1))
+}
+
+/// The set bits of `bits`, each a group of a tile.
+#[inline(always)]
+pub fn groups(mut bits: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let g = bits.trailing_zeros() as usize & (GROUPS - 1);
+        (bits != 0).then(|| {
+            bits &= bits - 1;
+            g
+        })
+    })
+}
+
 impl Listing {
-    /// Groups that meet triangles.
+    /// Listed group by group: the groups that meet triangles.
     #[inline(always)]
     pub fn len(&self) -> usize {
         self.len.min(GROUPS)
     }
 
-    /// A group, and the triangles it meets, as bits.
+    /// One of them, and the triangles it meets, as bits.
     #[inline(always)]
     pub fn get(&self, k: usize) -> (usize, u32) {
         let g = usize::from(self.groups[k]) & (GROUPS - 1);
         (g, self.triangles[g].into())
+    }
+
+    /// Listed triangle by triangle: those that groups meet, as bits.
+    #[inline(always)]
+    pub fn seen(&self) -> u32 {
+        self.seen
+    }
+
+    /// The groups that meet triangle `i`, as bits.
+    #[inline(always)]
+    pub fn groups(&self, i: usize) -> u64 {
+        self.met[i & (BATCH - 1)]
+    }
+
+    /// All groups with some of the `wanted` triangles.
+    #[inline(always)]
+    pub fn each(&self, wanted: u32, mut pair: impl FnMut(usize, usize)) {
+        if self.by_groups {
+            for (g, met) in (0..self.len()).map(|k| self.get(k)) {
+                triangles(met & wanted).for_each(|i| pair(g, i));
+            }
+        } else {
+            for i in triangles(self.seen & wanted) {
+                groups(self.groups(i)).for_each(|g| pair(g, i));
+            }
+        }
     }
 
     /// Lists which of the `seen` triangles the groups of `N` sets meet, of those that met their leaves.
@@ -63,9 +121,11 @@ impl Listing {
         }
         (self.len, self.pairs) = (0, 0);
         // A group costs with all triangles what a set costs with one; half or twice as much makes no difference.
-        if any.count_ones() <= some.iter().map(|some| some.count_ones()).sum::<u32>() {
-            self.by_groups::<EXACT>(&wanted, any, groups, planes);
+        self.by_groups = any.count_ones() <= some.iter().map(|some| some.count_ones()).sum::<u32>();
+        if self.by_groups {
+            self.group_by_group::<EXACT>(&wanted, any, groups, planes);
         } else {
+            (self.met, self.seen) = ([0; BATCH], 0);
             for (q, some) in some.into_iter().enumerate().take(N) {
                 self.set::<EXACT>(q, &wanted, some, groups, planes);
             }
@@ -74,7 +134,7 @@ impl Listing {
 
     /// All triangles against one group after the other.
     #[inline(always)]
-    fn by_groups<const EXACT: bool>(&mut self, wanted: &[u64; BATCH], any: u64, groups: &Groups, planes: &Planes) {
+    fn group_by_group<const EXACT: bool>(&mut self, wanted: &[u64; BATCH], any: u64, groups: &Groups, planes: &Planes) {
         let linear = |k: usize| each(|x| V::load(&planes.linear[k][x]));
         let linear = [linear(0), linear(1), linear(2), linear(3)];
         let (outside, most) = (V::load(&planes.outside), V::load(&planes.most));
@@ -110,7 +170,6 @@ impl Listing {
     /// All groups of set `q` against one after the other of some triangles.
     #[inline(always)]
     fn set<const EXACT: bool>(&mut self, q: usize, wanted: &[u64; BATCH], some: u32, groups: &Groups, planes: &Planes) {
-        let mut met_by = Columns::none();
         let mut rest = some;
         while rest != 0 {
             let i = rest.trailing_zeros() as usize & (BATCH - 1);
@@ -125,17 +184,13 @@ impl Listing {
             };
             let edge = largest(0).fast_min(largest(1)).fast_min(largest(2));
             let inverse = largest(3);
-            let inverse = if EXACT { inverse * V::splat(planes.most[i]) } else { own_depth(planes, i, inverse) };
+            let inverse = if EXACT { inverse * V::splat(planes.most[i]) } else { Plane::of(planes, i).within(inverse) };
             let met = V::splat(planes.outside[i]).cmp_le(edge) & groups.least[q].cmp_le(inverse);
             let wild = if EXACT { 0 } else { 0u32.wrapping_sub(planes.wild >> i & 1) };
             let met = (met.bits() | wild) & (wanted[i] >> (q * SET)) as u32 & 0xffff;
             self.pairs += met.count_ones() as usize;
-            met_by = met_by.with(met, i as u32);
-        }
-        let met = met_by.not_zero();
-        self.triangles[q * SET..][..SET].copy_from_slice(&met_by.words());
-        if let Some(list) = self.groups[self.len.min(GROUPS)..].first_chunk_mut() {
-            self.len += list_bits(met, (q * SET) as u8, list);
+            self.met[i] |= u64::from(met) << (q * SET);
+            self.seen |= u32::from(met != 0) << i;
         }
     }
 }
@@ -144,11 +199,12 @@ impl Listing {
 mod tests {
     use super::*;
 
-    /// Groups with the triangles they meet, in the order of groups.
-    fn pairs(listing: &Listing) -> Vec<(usize, u32)> {
-        let mut pairs: Vec<_> = (0..listing.len()).map(|k| listing.get(k)).collect();
+    /// Pairs of a group and a triangle, in order.
+    fn pairs(listing: &Listing) -> Vec<(usize, usize)> {
+        let mut pairs = Vec::new();
+        listing.each(0xffff, |g, i| pairs.push((g, i)));
         pairs.sort_unstable();
-        assert_eq!(listing.pairs, pairs.iter().map(|(_, met)| met.count_ones() as usize).sum::<usize>());
+        assert_eq!(listing.pairs, pairs.len());
         pairs
     }
 
@@ -187,12 +243,10 @@ mod tests {
             let any = wanted.iter().fold(0, |any, wanted| any | wanted);
             let (groups, planes) = (&*groups, &*planes);
             let mut both = |exact: bool| {
-                for listing in [&mut by_groups, &mut by_sets] {
-                    (listing.len, listing.pairs) = (0, 0);
-                }
+                (by_groups, by_sets) = (Listing::default(), Listing { by_groups: false, ..Listing::default() });
                 match exact {
-                    true => by_groups.by_groups::<true>(&wanted, any, groups, planes),
-                    false => by_groups.by_groups::<false>(&wanted, any, groups, planes),
+                    true => by_groups.group_by_group::<true>(&wanted, any, groups, planes),
+                    false => by_groups.group_by_group::<false>(&wanted, any, groups, planes),
                 }
                 for q in 0..SETS {
                     match exact {
@@ -202,11 +256,12 @@ mod tests {
                 }
                 let pairs = [pairs(&by_groups), pairs(&by_sets)];
                 assert_eq!(pairs[0], pairs[1]);
-                for &(g, met) in &pairs[0] {
-                    let is_wanted = |i: &usize| wanted[*i] >> g & 1 != 0;
-                    assert!((0..BATCH).filter(|i| met >> i & 1 != 0).all(|i| is_wanted(&i)));
-                    let wild = if exact { 0 } else { planes.wild };
-                    assert!((0..BATCH).filter(is_wanted).all(|i| wild & !met & 1 << i == 0));
+                let seen = pairs[0].iter().fold(0, |seen, &(_, i)| seen | 1 << i);
+                assert_eq!(by_sets.seen(), seen);
+                assert!(pairs[0].iter().all(|&(g, i)| wanted[i] >> g & 1 != 0));
+                let wild = if exact { 0 } else { planes.wild };
+                for (i, wanted) in wanted.iter().enumerate().filter(|(i, _)| wild >> i & 1 != 0) {
+                    assert!((0..GROUPS).filter(|g| wanted >> g & 1 != 0).all(|g| pairs[0].contains(&(g, i))));
                 }
                 by_groups.pairs
             };

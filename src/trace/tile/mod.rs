@@ -175,8 +175,7 @@ impl<'a> Job<'a> {
         // What one call learns must not change what another one answers.
         self.memory.slabs.forget();
         // Later ones are asked for while those before them are read, or written.
-        let is_sample = |g: &usize| g % SETS == 0;
-        (0..GROUPS).filter(is_sample).chain(0..bundle::AHEAD).for_each(|g| bundle::prefetch_rays(self.rays, g * V::N));
+        bundle::prefetch_first(self.rays);
         for first in (0..self.rays.len()).step_by(BLOCK) {
             if !suits {
                 self.leave::<SETS>(first);
@@ -322,10 +321,7 @@ impl<'a> Job<'a> {
         let exact = Exact { bundle, world: self.world, object: self.world.first_object() };
         walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
-            // Of the next block those groups whose rays its frame is made of: they are looked at first.
-            if g % SETS == 0 {
-                bundle::prefetch_rays(self.rays, bundle.first + BLOCK + g * V::N);
-            }
+            bundle::prefetch_sample(self.rays, bundle.first + BLOCK, g);
             if !self.past {
                 self.output.prefetch(bundle.first + (g + bundle::AHEAD) * V::N);
             }

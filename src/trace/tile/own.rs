@@ -7,20 +7,15 @@ use super::batch::{Batch, Planes};
 use super::bundle::Bundle;
 use super::exact::Exact;
 use super::groups::{Group, Groups, NO_SLOT};
+use super::held::{Line, Plane};
 use super::shapes;
 use super::{Mask, V, select};
 use crate::lanes::chosen::merge;
 use crate::lanes::past::store_past;
 use crate::lanes::words::{below, positions};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, f64x8, map3};
+use crate::lanes::{LaneMask, Lanes, f64x8, map3};
 use crate::ray::{HitPacket, Hits, INVALID_ID};
 use crate::shape::{Block, Triangle};
-
-/// 1/z of triangle `i` where its plane says `inverse`: not nearer and not farther than its corners.
-#[inline(always)]
-pub fn own_depth(planes: &Planes, i: usize, inverse: V) -> V {
-    V::splat(planes.nearest[i]).fast_min(V::splat(planes.farthest[i]).fast_max(inverse))
-}
 
 /// The numbers of a triangle: ties of depth go to the smaller instance, then to the smaller primitive.
 #[derive(Clone, Copy, Debug)]
@@ -63,14 +58,7 @@ fn keep(groups: &mut Groups, g: usize, hit: Mask, inverse: V, found: [V; 2]) {
     weights[1] = select(hit, found[1], weights[1]);
 }
 
-/// How far segments that begin at `start` begin behind a triangle's plane as seen from their common point; in some unit.
-#[inline(always)]
-pub fn behind(start: &Lanes3<V>, planes: &Planes, i: usize) -> V {
-    let (normal, way) = planes.to_starts(i, start);
-    dot(normal, way)
-}
-
-/// [`pair`] where edges need more digits than f32 has: for rays that pass an edge within its rounding, and for the weights of
+/// [`Plane::meet`] where edges need more digits than f32 has: for rays that pass an edge within its rounding, and for the weights of
 /// slivers and of triangles much smaller than a pixel. What is not certainly outside is looked at again in f64, for the same
 /// corners and rays; so is what was found.
 #[cold]
@@ -83,14 +71,11 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     id: Id,
     to_end: bool,
 ) -> bool {
-    let ray = [groups.of[g].s, groups.of[g].t];
-    let inverse = own_depth(planes, i, linear(ray, planes, i, 3));
-    let best = groups.of[g].inv_lo;
-    let mut maybe = edges(ray, planes, i).possible & inverse.cmp_le(groups.of[g].inv_hi);
+    let (plane, line) = (Plane::of(planes, i), Line::of(groups, g));
+    let (inverse, best) = (plane.depth(&line), line.best);
+    let mut maybe = plane.edges(&line).possible & inverse.cmp_le(groups.of[g].inv_hi);
     if ANY && to_end {
-        maybe = maybe
-            & V::constant(0.0).cmp_le(behind(&groups.of[g].start, planes, i))
-            & best.cmp_lt(V::splat(f32::INFINITY));
+        maybe = maybe & V::constant(0.0).cmp_le(plane.behind(&line)) & best.cmp_lt(V::splat(f32::INFINITY));
     } else {
         maybe = maybe & best.cmp_le(inverse);
     }
@@ -98,7 +83,7 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     if !ANY {
         maybe = maybe & (best.cmp_lt(inverse) | id.is_not_after::<MANY>(groups, g));
         if groups.is_behind {
-            ahead = -behind(&groups.of[g].start, planes, i);
+            ahead = -plane.behind(&line);
             maybe = maybe & V::constant(0.0).cmp_le(ahead);
         }
     }
@@ -107,7 +92,7 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
         return occlude(groups, g, hit);
     }
     if groups.is_behind {
-        groups.ahead[g] = select(hit, ahead * V::splat(planes.rcp[i]), groups.ahead[g]);
+        groups.ahead[g] = select(hit, plane.share(ahead), groups.ahead[g]);
     }
     id.name::<MANY>(groups, g, hit);
     keep(groups, g, hit, inverse, weights.map(|w| w * inverse));
@@ -153,35 +138,10 @@ fn weights_f64(corners: &[[f64; 3]; 3], ray: [f64x8; 2]) -> (u32, [f64x8; 2]) {
     (inside, [weight(edges[1]), weight(edges[2])])
 }
 
-/// A linear function of triangle `i` at some rays.
-#[inline(always)]
-pub fn linear([s, t]: [V; 2], planes: &Planes, i: usize, k: usize) -> V {
-    let [x, y, z] = each(|x| V::splat(planes.linear[k][x][i]));
-    x.mul_add(s, y.mul_add(t, z))
-}
-
-/// A triangle's edges against some rays.
-pub struct Edges {
-    /// Lanes not surely outside.
-    pub possible: Mask,
-    /// Lanes surely inside.
-    pub certain: Mask,
-    /// Weights of the second and third corner, times 1/z.
-    pub weights: [V; 2],
-}
-
-#[inline(always)]
-pub fn edges(ray: [V; 2], planes: &Planes, i: usize) -> Edges {
-    let [e0, e1, e2] = each(|k| linear(ray, planes, i, k));
-    let least = e0.fast_min(e1).fast_min(e2);
-    let [possible, certain] = [planes.outside[i], planes.inside[i]].map(|x| V::splat(x).cmp_le(least));
-    Edges { possible, certain, weights: [e1, e2] }
-}
-
 /// Whether some ray of a group is not certainly outside triangle `i`.
 #[inline(always)]
 pub fn may_be_inside(groups: &Groups, planes: &Planes, g: usize, i: usize) -> bool {
-    edges([groups.of[g].s, groups.of[g].t], planes, i).possible.any()
+    Plane::of(planes, i).edges(&Line::of(groups, g)).possible.any()
 }
 
 /// Lanes that found something want nothing any more.

@@ -3,23 +3,32 @@
 use super::batch::BATCH;
 use super::bundle::Shared;
 use super::exact::{self, Exact, certain_pair};
-use super::held::{Held, Verdict};
+use super::held::{Held, Line, Plane};
+use super::listing::{self, triangles};
 use super::own::{self, Id, may_be_inside, pair_doubtful};
-use super::{GROUPS, Memory, SET, V};
-use crate::lanes::chosen::lanes_of;
+use super::{GROUPS, Memory, SET, SETS, V};
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::Counters;
 
-/// Groups with the triangles, as bits, that are to be looked at again.
+/// What is to be looked at again, as bits: of groups the triangles, or of triangles the groups.
 #[derive(Clone, Debug)]
 pub struct Again {
-    of: [(u16, u16); GROUPS],
+    of: [(u8, u64); GROUPS],
     len: usize,
 }
 
 impl Default for Again {
     fn default() -> Self {
         Self { of: [(0, 0); GROUPS], len: 0 }
+    }
+}
+
+impl Again {
+    /// Always written, counted where there are any: that is a surprise every time.
+    #[inline(always)]
+    fn add(&mut self, of: usize, doubts: u64) {
+        self.of[self.len & (GROUPS - 1)] = (of as u8, doubts);
+        self.len += usize::from(doubts != 0);
     }
 }
 
@@ -38,6 +47,13 @@ impl Tested {
     fn find(&mut self, g: usize, count: u32) {
         self.found += count as usize;
         self.sets |= u32::from(count != 0) << (g / SET);
+    }
+
+    /// One pair of each of some groups gave something.
+    #[inline(always)]
+    fn find_all(&mut self, groups: u64) {
+        self.found += groups.count_ones() as usize;
+        (0..SETS).for_each(|q| self.sets |= u32::from(groups >> (q * SET) & 0xffff != 0) << q);
     }
 }
 
@@ -76,12 +92,6 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     }
 }
 
-/// The set bits of `bits`, each a triangle of a batch.
-#[inline(always)]
-fn triangles(bits: u32) -> impl Iterator<Item = usize> {
-    lanes_of(bits).map(|i| i & (BATCH - 1))
-}
-
 /// Tests the listed pairs. `MANY`: triangles are of instances. `BEHIND`: the common point is behind the rays. `END`: it is
 /// where they end.
 #[inline(always)]
@@ -104,44 +114,58 @@ fn test<
     let odd = planes.wild | if BEHIND { planes.flat } else { 0 };
     let mut tested = Tested::default();
     again.len = 0;
-    for k in 0..listing.len() {
-        let (g, met) = listing.get(k);
-        if met & !odd == 0 {
-            continue;
-        }
-        let (mut held, mut hits, mut doubts) = (Held::of::<MANY>(groups, g), 0, 0);
-        for i in triangles(met & !odd) {
-            if COUNT {
-                count_pair(held.best, counters);
+    if listing.by_groups {
+        for (g, met) in (0..listing.len()).map(|k| listing.get(k)) {
+            if met & !odd == 0 {
+                continue;
             }
-            let Verdict { hit, doubt } = held.pair::<ANY, MANY, BEHIND, END, EARLY>(planes, i, id(i));
-            hits |= u32::from(hit) << i;
-            doubts |= u32::from(doubt) << i;
+            let (mut held, mut hits, mut doubts) = (Held::of::<MANY>(groups, g), 0, 0);
+            for i in triangles(met & !odd) {
+                if COUNT {
+                    count_pair(held.line.best, counters);
+                }
+                let plane = Plane::of(planes, i);
+                let met = plane.meet::<ANY, BEHIND, END, EARLY>(&held.line);
+                held.take::<ANY, MANY, BEHIND>(&plane, &met, id(i));
+                hits |= u32::from(met.hit()) << i;
+                doubts |= u32::from(met.doubt()) << i;
+            }
+            held.put::<ANY, MANY, BEHIND>(groups, g);
+            tested.find(g, hits.count_ones());
+            again.add(g, (doubts | hits & unsteady).into());
         }
-        held.put::<ANY, MANY, BEHIND>(groups, g);
-        tested.find(g, hits.count_ones());
-        // Always written, counted where there are any: that is a surprise every time.
-        let doubts = doubts | hits & unsteady;
-        again.of[again.len & (GROUPS - 1)] = (g as u16, doubts as u16);
-        again.len += usize::from(doubts != 0);
-    }
-    if odd != 0 {
-        for k in 0..listing.len() {
-            let (g, met) = listing.get(k);
-            for i in triangles(met & odd) {
+    } else {
+        for i in triangles(listing.seen() & !odd) {
+            let (plane, id, mut hits, mut doubts) = (Plane::of(planes, i), id(i), 0, 0);
+            for g in listing::groups(listing.groups(i)) {
                 if COUNT {
                     count_pair(groups.of[g].inv_lo, counters);
                 }
-                if planes.wild >> i & 1 != 0 || may_be_inside(groups, planes, g, i) {
-                    tested.find(g, own::decide::<ANY, MANY>(groups, exact, g, batch, i).into());
-                }
+                let met = plane.meet::<ANY, BEHIND, END, EARLY>(&Line::of(groups, g));
+                groups.take::<ANY, MANY, BEHIND>(g, &plane, &met, id);
+                hits |= u64::from(met.hit()) << g;
+                doubts |= u64::from(met.doubt()) << g;
             }
+            tested.find_all(hits);
+            again.add(i, if unsteady >> i & 1 != 0 { doubts | hits } else { doubts });
         }
     }
-    for &(g, doubts) in again.of.iter().take(again.len) {
-        for i in triangles(doubts.into()) {
-            let found = pair_doubtful::<ANY, MANY>(groups, planes, g.into(), i, id(i), END);
-            tested.sets |= u32::from(found) << (usize::from(g) / SET);
+    if odd != 0 {
+        listing.each(odd, |g, i| {
+            if COUNT {
+                count_pair(groups.of[g].inv_lo, counters);
+            }
+            if planes.wild >> i & 1 != 0 || may_be_inside(groups, planes, g, i) {
+                tested.find(g, own::decide::<ANY, MANY>(groups, exact, g, batch, i).into());
+            }
+        });
+    }
+    for &(of, doubts) in again.of.iter().take(again.len) {
+        for other in listing::groups(doubts) {
+            let (g, i) = if listing.by_groups { (of.into(), other) } else { (other, of.into()) };
+            let (g, i) = (g & (GROUPS - 1), i & (BATCH - 1));
+            let found = pair_doubtful::<ANY, MANY>(groups, planes, g, i, id(i), END);
+            tested.sets |= u32::from(found) << (g / SET);
         }
     }
     tested
@@ -156,19 +180,16 @@ fn test_exact<const ANY: bool, const BEHIND: bool, const COUNT: bool>(
 ) -> Tested {
     let Memory { groups, batch, planes, listing, .. } = memory;
     let mut tested = Tested::default();
-    for k in 0..listing.len() {
-        let (g, met) = listing.get(k);
-        for i in triangles(met) {
-            if COUNT {
-                count_pair(groups.of[g].inv_lo, counters);
-            }
-            let (certain, doubtful) = certain_pair::<ANY, BEHIND>(groups, planes, g, i, batch.id[i]);
-            tested.find(g, (certain | doubtful != 0).into());
-            if doubtful != 0 {
-                exact::decide::<ANY>(groups, exact, g, batch.id[i], doubtful);
-            }
+    listing.each(0xffff, |g, i| {
+        if COUNT {
+            count_pair(groups.of[g].inv_lo, counters);
         }
-    }
+        let (certain, doubtful) = certain_pair::<ANY, BEHIND>(groups, planes, g, i, batch.id[i]);
+        tested.find(g, (certain | doubtful != 0).into());
+        if doubtful != 0 {
+            exact::decide::<ANY>(groups, exact, g, batch.id[i], doubtful);
+        }
+    });
     tested
 }
 
