@@ -104,7 +104,7 @@ pub fn prefetch_first(rays: &Rays<f32>) {
 /// Asks the memory for group `g` of the block that starts with ray `first`, if the block's frame is made of it.
 #[inline(always)]
 pub fn prefetch_sample(rays: &Rays<f32>, first: usize, g: usize) {
-    if g % SETS == 0 {
+    if g.is_multiple_of(SETS) {
         prefetch_rays(rays, first + g * V::N);
     }
 }
