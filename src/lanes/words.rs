@@ -149,9 +149,24 @@ pub fn row_minima(rows: &[f32x16; 16]) -> f32x16 {
 /// The same of rows that lie apart. One by one: a loop over them would copy them into memory first.
 #[inline(always)]
 pub fn row_minima_of(row: impl Fn(usize) -> f32x16) -> f32x16 {
-    let rows = [row(0), row(1), row(2), row(3), row(4), row(5), row(6), row(7), row(8), row(9), row(10), row(11)];
-    let [a, b, c, d, e, f, g, h, i, j, k, l] = rows;
-    row_minima(&[a, b, c, d, e, f, g, h, i, j, k, l, row(12), row(13), row(14), row(15)])
+    row_minima(&[
+        row(0),
+        row(1),
+        row(2),
+        row(3),
+        row(4),
+        row(5),
+        row(6),
+        row(7),
+        row(8),
+        row(9),
+        row(10),
+        row(11),
+        row(12),
+        row(13),
+        row(14),
+        row(15),
+    ])
 }
 
 #[cfg(any(test, not(target_feature = "avx512f")))]

@@ -181,35 +181,7 @@ impl Plane {
     }
 }
 
-impl Groups {
-    /// Stores what group `g` found in one triangle. `MANY`: it is of an instance.
-    #[inline(always)]
-    pub fn take<const ANY: bool, const MANY: bool, const BEHIND: bool>(
-        &mut self,
-        g: usize,
-        plane: &Plane,
-        met: &Met,
-        id: Id,
-    ) {
-        let group = &mut self.of[g];
-        let hit = met.hit;
-        group.inv_lo = select(hit, met.best, group.inv_lo);
-        if ANY {
-            return;
-        }
-        group.weights[0] = select(hit, met.weights[0], group.weights[0]);
-        group.weights[1] = select(hit, met.weights[1], group.weights[1]);
-        group.slot = bytemuck::cast(met.name(id.prim, V::new(bytemuck::cast(group.slot))).to_array());
-        if MANY {
-            self.inst[g] = bytemuck::cast(met.name(id.inst, V::new(bytemuck::cast(self.inst[g]))).to_array());
-        }
-        if BEHIND {
-            self.ahead[g] = select(hit, plane.share(met.ahead), self.ahead[g]);
-        }
-    }
-}
-
-/// A group and what it found, while some triangles are tested against it.
+/// A group and what it found, while triangles are tested against it.
 #[derive(Clone, Copy, Debug)]
 pub struct Held {
     /// Its rays.

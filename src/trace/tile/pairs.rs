@@ -3,7 +3,7 @@
 use super::batch::BATCH;
 use super::bundle::Shared;
 use super::exact::{self, Exact, certain_pair};
-use super::held::{Held, Line, Plane};
+use super::held::{Held, Plane};
 use super::listing::{self, triangles};
 use super::own::{self, Id, may_be_inside, pair_doubtful};
 use super::{GROUPS, Memory, SET, SETS, V};
@@ -141,8 +141,10 @@ fn test<
                 if COUNT {
                     count_pair(groups.of[g].inv_lo, counters);
                 }
-                let met = plane.meet::<ANY, BEHIND, END, EARLY>(&Line::of(groups, g));
-                groups.take::<ANY, MANY, BEHIND>(g, &plane, &met, id);
+                let mut held = Held::of::<MANY>(groups, g);
+                let met = plane.meet::<ANY, BEHIND, END, EARLY>(&held.line);
+                held.take::<ANY, MANY, BEHIND>(&plane, &met, id);
+                held.put::<ANY, MANY, BEHIND>(groups, g);
                 hits |= u64::from(met.hit()) << g;
                 doubts |= u64::from(met.doubt()) << g;
             }
