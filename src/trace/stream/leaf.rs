@@ -1,12 +1,14 @@
 //! Leaves: a chunk's rays against one block of primitives.
 
+use super::best::Best;
 use super::chunk::{Chunk, RAYS, Set};
+use super::due;
 use super::walk::Walk;
 use crate::bvh::Child;
 use crate::lanes::{LaneMask, Lanes, Real, map3};
-use crate::ray::{HitPacket, Packet};
+use crate::ray::{Counters, HitPacket, Packet};
 use crate::scene::world::{Class, Object};
-use crate::shape::{BLOCK, Facts, Triangle};
+use crate::shape::{BLOCK, Block, Facts, Triangle};
 use crate::trace::leaf;
 use crate::trace::query::Query;
 
@@ -47,8 +49,11 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
             }
         }
     }
-    if few != 0 {
+    // To know what it hits soon is worth more to a ray that asks for the nearest, or to many.
+    if !ANY || walk.at_once || few.count_ones() >= due::FEW {
         sparse::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk, child, few);
+    } else if walk.due.add(child, few) {
+        due::test::<V::Scalar, COUNT>(object, inst, chunk, walk);
     }
 }
 
@@ -89,32 +94,75 @@ fn vector<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
 }
 
-/// Rays of a chunk that are to be looked at closer, with which triangles of a block.
+/// Rays that are to be looked at closer, with which triangles of a block.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub struct Closer<S> {
     /// Their edge functions with all triangles.
     edges: [[[S; BLOCK]; 3]; RAYS],
-    ray: [u8; RAYS],
+    /// Whatever the caller knows them by.
+    of: [u8; RAYS],
     slots: [u8; RAYS],
     len: usize,
 }
 
 impl<S: Real> Default for Closer<S> {
     fn default() -> Self {
-        Self { edges: [[[S::ZERO; BLOCK]; 3]; RAYS], ray: [0; RAYS], slots: [0; RAYS], len: 0 }
+        Self { edges: [[[S::ZERO; BLOCK]; 3]; RAYS], of: [0; RAYS], slots: [0; RAYS], len: 0 }
     }
 }
 
 impl<S: Real> Closer<S> {
-    /// Adds a ray with the triangles whose bits are set. Always writes it and takes it back if there are none: whether there are is a
-    /// surprise every time.
+    /// Nothing is to be looked at.
     #[inline(always)]
-    fn add(&mut self, ray: usize, slots: u32, edges: [S::Octo; 3]) {
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// How many there are.
+    #[inline(always)]
+    pub fn len(&self) -> usize {
+        self.len.min(RAYS)
+    }
+
+    /// What the caller knows number `at` by.
+    #[inline(always)]
+    pub fn of(&self, at: usize) -> usize {
+        self.of[at].into()
+    }
+
+    /// Tests a ray against the first `count` triangles of a block and adds it, as `of`, if it may hit some. Always writes it and
+    /// takes it back if there are none: whether there are is a surprise every time.
+    #[inline(always)]
+    pub fn add(&mut self, of: usize, chunk: &Chunk<S>, best: &Best<S>, ray: usize, (block, count): (&Block<S, 9>, u8)) {
+        let (maybe, edges) = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], best.t[ray], block);
+        let slots = maybe & ((1 << count) - 1);
         let at = self.len & (RAYS - 1);
-        (self.ray[at], self.slots[at]) = (ray as u8, slots as u8);
+        (self.of[at], self.slots[at]) = (of as u8, slots as u8);
         self.edges[at].iter_mut().zip(edges).for_each(|(to, edge)| edge.store(to));
         self.len = at + usize::from(slots != 0);
+    }
+
+    /// Looks at number `at`, which is `ray`, and keeps what it hits.
+    #[inline(always)]
+    pub fn look<const ANY: bool>(
+        &self,
+        at: usize,
+        chunk: &Chunk<S>,
+        best: &mut Best<S>,
+        ray: usize,
+        (block, facts): (&Block<S, 9>, &Facts<S::Octo>),
+        inst: u32,
+    ) {
+        let edges = map3(self.edges[at], |edge| S::Octo::load(&edge));
+        let slots = self.slots[at].into();
+        let found = Triangle::look_closer(&chunk.splat(ray), block, facts, slots, edges, chunk.flat);
+        let wanted = (found.hit & found.t.cmp_le(S::Octo::splat(best.t[ray]))).bits();
+        if ANY {
+            best.done |= Set::from(wanted != 0) << ray;
+        } else if wanted != 0 {
+            best.take(ray, wanted, &found, &block.prim, inst);
+        }
     }
 }
 
@@ -130,37 +178,34 @@ fn sparse<S: Real, const ANY: bool, const COUNT: bool>(
     rays: Set,
 ) {
     let block = &object.triangles[child.index as usize];
-    let all = (1 << child.count) - 1;
-    walk.closer.len = 0;
+    let Walk { best, closer, .. } = walk;
+    closer.clear();
     for half in 0..2 {
         let mut rest = (rays >> (64 * half)) as u64;
         while rest != 0 {
             let ray = (64 * half + rest.trailing_zeros() as usize) & (RAYS - 1);
             rest &= rest - 1;
-            let (maybe, edges) = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], walk.best.t[ray], block);
-            walk.closer.add(ray, all & maybe, edges);
-            if COUNT {
-                walk.counters.leaves += 1;
-                walk.counters.prims += u64::from(child.count);
-                walk.counters.prim_lanes_active += u64::from(child.count);
-                walk.counters.prim_lanes_total += u64::from(child.count);
-            }
+            closer.add(ray, chunk, best, ray, (block, child.count));
         }
     }
-    if walk.closer.len == 0 {
+    if COUNT {
+        count(walk.counters, child.count, rays.count_ones());
+    }
+    if closer.len() == 0 {
         return;
     }
     let facts = Facts::of_block(block);
-    for at in 0..walk.closer.len.min(RAYS) {
-        let ray = usize::from(walk.closer.ray[at]) & (RAYS - 1);
-        let edges = map3(walk.closer.edges[at], |edge| S::Octo::load(&edge));
-        let slots = walk.closer.slots[at].into();
-        let found = Triangle::look_closer(&chunk.splat(ray), block, &facts, slots, edges, chunk.flat);
-        let wanted = (found.hit & found.t.cmp_le(S::Octo::splat(walk.best.t[ray]))).bits();
-        if ANY {
-            walk.best.done |= Set::from(wanted != 0) << ray;
-        } else if wanted != 0 {
-            walk.best.take(ray, wanted, &found, &block.prim, inst);
-        }
+    for at in 0..closer.len() {
+        let ray = closer.of(at) & (RAYS - 1);
+        closer.look::<ANY>(at, chunk, best, ray, (block, &facts), inst);
     }
+}
+
+/// Counts tests of single rays against all triangles of a block.
+pub fn count(counters: &mut Counters, triangles: u8, rays: u32) {
+    let tests = u64::from(triangles) * u64::from(rays);
+    counters.leaves += u64::from(rays);
+    counters.prims += tests;
+    counters.prim_lanes_active += tests;
+    counters.prim_lanes_total += tests;
 }

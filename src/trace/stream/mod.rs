@@ -11,9 +11,11 @@
 //! Ray Stream Tracing", 2009; Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray tracing kernels for modern CPU
 //! architectures", 2015.
 
+mod best;
 mod block;
 mod bounds;
 mod chunk;
+mod due;
 mod leaf;
 mod node;
 mod visitors;
@@ -28,8 +30,9 @@ use crate::lanes::words::{prefetch, transpose_bits};
 use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
+use best::Best;
 use block::Block;
-use chunk::{Best, Chunk, RAYS};
+use chunk::{Chunk, RAYS};
 pub use visitors::{MOST, Visitors};
 
 /// Rays that are sorted together.
@@ -271,9 +274,7 @@ impl<S: Real> Job<'_, S> {
                 rest = others;
                 chunk.gather::<V, ANY>(self.rays, ids, &mut best.t);
                 best.start();
-                let (stack, counters) = (&mut *self.stack, &mut *self.counters);
-                let (waiting, closer) = (&mut *waiting, &mut *closer);
-                let mut walk = walk::Walk { best: &mut *best, waiting, closer, stack, counters };
+                let mut walk = walk::Walk::new(best, (waiting, closer), self.stack, self.counters);
                 walk.world::<V, ANY, COUNT>(self.world, chunk, local, octant);
                 match &mut self.output {
                     Output::Closest(hits) => best.scatter(hits, ids),

@@ -242,7 +242,7 @@ mod tests {
             // A direction of zero points up, whatever the octant.
             let (mut rest, mut of_octant) = (Set::MAX, 0);
             while rest != 0 {
-                let (own, alike) = chunk.first_octant(rest);
+                let (own, alike) = chunk.first_octant::<V>(rest);
                 of_octant |= if own == octant { alike } else { 0 };
                 rest &= !alike;
             }

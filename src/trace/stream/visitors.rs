@@ -1,6 +1,7 @@
 //! Rays of another engine, as they come: a chunk in an object's space that is filled vector by vector.
 
-use super::chunk::{Best, Chunk, RAYS, Set};
+use super::best::Best;
+use super::chunk::{Chunk, RAYS, Set};
 use super::leaf::Closer;
 use super::walk::{Pile, Walk};
 use crate::lanes::{Lanes, Real};
@@ -40,8 +41,9 @@ impl<S: Real> Visitors<S> {
         if k == 0 {
             self.chunk.start(RAYS);
             self.rays = 0;
-            self.best.start();
+            self.best.done = 0;
         }
+        self.best.clear::<V>(k * V::N);
         self.chunk.take(k * V::N, packet);
         t_max.store(&mut self.best.t[k * V::N..]);
         self.rays |= Set::from(lanes) << (k * V::N);
@@ -58,8 +60,7 @@ impl<S: Real> Visitors<S> {
         let Self { chunk, best, waiting, closer, rays } = self;
         chunk.len = vectors * V::N;
         chunk.finish::<V, ANY>(*rays);
-        let mut walk = Walk { best, waiting, closer, stack, counters };
-        walk.octants::<V, ANY, COUNT>(object, inst, chunk, *rays);
+        Walk::new(best, (waiting, closer), stack, counters).octants::<V, ANY, COUNT>(object, inst, chunk, *rays);
     }
 
     /// What the rays of vector `k` hit.

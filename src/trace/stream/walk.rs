@@ -1,6 +1,8 @@
 //! A chunk's way through the trees.
 
-use super::chunk::{Best, Chunk, RAYS, Set};
+use super::best::Best;
+use super::chunk::{Chunk, RAYS, Set};
+use super::due::{self, Due};
 use super::{leaf, node};
 use crate::bvh::{Child, Node, Tree, WIDTH};
 use crate::lanes::words::prefetch_either;
@@ -70,9 +72,24 @@ pub struct Walk<'a, S> {
     pub stack: &'a mut Stack<S>,
     /// Counters.
     pub counters: &'a mut Counters,
+    /// Rays that wait to be tested.
+    pub due: Due,
+    /// Whether none is to wait.
+    pub at_once: bool,
 }
 
-impl<S: Real> Walk<'_, S> {
+impl<'a, S: Real> Walk<'a, S> {
+    /// The beginning of a query.
+    #[inline(always)]
+    pub fn new(
+        best: &'a mut Best<S>,
+        (waiting, closer): (&'a mut Pile<S>, &'a mut leaf::Closer<S>),
+        stack: &'a mut Stack<S>,
+        counters: &'a mut Counters,
+    ) -> Self {
+        Self { best, waiting, closer, stack, counters, due: Due::default(), at_once: false }
+    }
+
     /// Traces a chunk of one octant through the whole world. `local` is room for the chunk in an instance's space.
     pub fn world<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
         &mut self,
@@ -131,7 +148,7 @@ impl<S: Real> Walk<'_, S> {
     ) {
         let mut rest = rays;
         while rest != 0 {
-            let (octant, alike) = local.first_octant(rest);
+            let (octant, alike) = local.first_octant::<V>(rest);
             rest &= !alike;
             self.object::<V, ANY, COUNT>(object, inst, local, alike, octant);
         }
@@ -150,11 +167,15 @@ impl<S: Real> Walk<'_, S> {
                 packet_leaf::unbounded(object, inst, packet, query, lanes);
             });
         }
+        self.at_once = rays.count_ones() < due::LEAST;
         let nodes = &object.tree.nodes[..];
         let fetch = |child: Child| prefetch_either(nodes, &object.triangles, child.is_leaf(), child.index as usize);
         self.tree::<V, ANY, COUNT>(&object.tree, chunk, rays, octant, &fetch, |walk, child, rays| {
             leaf::block::<V, ANY, COUNT>(object, inst, chunk, walk, child, rays);
         });
+        if ANY && !self.due.is_empty() {
+            due::test::<S, COUNT>(object, inst, chunk, self);
+        }
     }
 
     /// Traverses `tree` with some rays of one octant. `fetch` asks the memory for a child.

@@ -198,17 +198,19 @@ impl<'a> Bundle<'a> {
     /// The rays of a group and their ends.
     #[inline(always)]
     pub fn packet(&self, g: usize) -> (Packet<V>, V) {
-        match self.source {
-            Source::Batch(rays) => {
-                let (packet, t_max, _) = Packet::load(rays, self.first + g * V::N);
-                (packet, t_max)
-            }
-            Source::Pencil(pencil, _) => {
-                let org = map3(self.apex, V::splat);
-                let dir = pencil.directions(self.first / V::N + g).map(V::new);
-                (Packet::new(org, dir, V::constant(0.0)), V::splat(f32::INFINITY))
-            }
-        }
+        let ([org, dir], [t_min, t_max]) = self.segments(g);
+        (Packet::new(org, dir, t_min), t_max)
+    }
+
+    /// The same as they are: origins and directions, starts and ends.
+    #[inline(always)]
+    pub fn segments(&self, g: usize) -> ([Lanes3<V>; 2], [V; 2]) {
+        let at = self.first + g * V::N;
+        let lines = match self.source {
+            Source::Batch(rays) => [load3(&rays.org, at), load3(&rays.dir, at)],
+            Source::Pencil(pencil, _) => [map3(self.apex, V::splat), pencil.directions(at / V::N).map(V::new)],
+        };
+        (lines, self.ends(g))
     }
 
     /// Asks the memory for the rays of a group.

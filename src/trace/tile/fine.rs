@@ -33,9 +33,9 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
                 // A little more than the best hit's parameter: ties are told by depths.
                 false => groups.of[g].slowness / groups.of[g].inv_lo * V::splat(1.0 + 16.0 * HALF_ULP),
             };
-            let (packet, t_max, lanes) = enter(exact, inst, g, limit);
-            let lanes = lanes & !groups.done(g, lanes);
-            if lanes != 0 {
+            let tame = exact.bundle.tame[g];
+            let lanes = tame & !groups.done(g, tame);
+            if let Some((packet, t_max, lanes)) = enter(exact, inst, g, limit, lanes) {
                 visitors.put(count, &packet, t_max, lanes);
                 of[count] = g;
                 count += 1;

@@ -7,6 +7,7 @@ use super::groups::Groups;
 use super::own::{Id, occlude};
 use super::{GROUPS, Mask, SET, V, select};
 use crate::bvh::Child;
+use crate::lanes::chosen::{merge, merge_lists};
 use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::slab::Interval;
@@ -15,20 +16,21 @@ use crate::scene::world::Object;
 use crate::trace::leaf;
 use crate::trace::query::{Query, Stack};
 
-/// The rays of a group in the space of an instance, their ends or `limit`, whichever is nearer, and the lanes that are traced
-/// and meet its box.
+/// The rays of a group in the space of an instance, their ends or `limit`, whichever is nearer, and those of `lanes` that meet its
+/// box; `None` if none does.
 #[inline(always)]
-pub fn enter(exact: &Exact, inst: u32, g: usize, limit: V) -> (Packet<V>, V, u32) {
-    let (packet, t_max) = exact.bundle.packet(g);
+pub fn enter(exact: &Exact, inst: u32, g: usize, limit: V, lanes: u32) -> Option<(Packet<V>, V, u32)> {
+    let ([org, dir], [t_min, t_max]) = exact.bundle.segments(g);
     // What is no number limits nothing.
     let t_max = limit.fast_min(t_max);
-    let (instance, tame) = (&exact.world.instances[inst as usize], exact.bundle.tame[g]);
+    let instance = &exact.world.instances[inst as usize];
     if instance.identity {
-        return (packet, t_max, tame);
+        return (lanes != 0).then(|| (Packet::new(org, dir, t_min), t_max, lanes));
     }
+    let packet = Packet::unsheared(org, dir, t_min);
     let interval = Interval::of(&packet, instance.bounds.lo, instance.bounds.hi);
-    let meets = interval.meets(packet.t_min, t_max).bits();
-    (packet.into_local(&instance.to_local, interval.near), t_max, tame & meets)
+    let lanes = interval.meets(t_min, t_max).bits() & lanes;
+    (lanes != 0).then(|| (packet.into_local(&instance.to_local, interval.near), t_max, lanes))
 }
 
 /// Tests a leaf of an instance's shapes against `wanted` groups of `N` sets.
@@ -46,8 +48,9 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
     while rest != 0 {
         let g = rest.trailing_zeros() as usize & (GROUPS - 1);
         rest &= rest - 1;
-        let (packet, t_max, lanes) = enter(exact, inst, g, V::splat(f32::INFINITY));
-        let lanes = lanes & !groups.done(g, lanes);
+        let tame = exact.bundle.tame[g];
+        let lanes = tame & !groups.done(g, tame);
+        let Some((packet, t_max, lanes)) = enter(exact, inst, g, V::splat(f32::INFINITY), lanes) else { continue };
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), stack, counters);
         leaf::block(object, inst, &packet, &mut query, leaf, lanes);
         let (hit, done) = (query.hit, query.done);
@@ -64,22 +67,23 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
 
 /// Keeps the hits of a packet where they are a group's nearest; whether any is.
 pub fn take(groups: &mut Groups, g: usize, hit: &HitPacket<V>, inst: u32) -> bool {
+    let found = Mask::from_bits(!positions(&hit.prim, INVALID_ID));
     let inverse = (groups.of[g].slowness / hit.t).fast_min(V::splat(f32::MAX));
-    let mut rest = !positions(&hit.prim, INVALID_ID) & V::ALL;
-    let mut any = false;
-    while rest != 0 {
-        let id = Id { inst, prim: hit.prim[rest.trailing_zeros() as usize & 15] };
-        let same = positions(&hit.prim, id.prim) & rest;
-        rest &= !same;
-        let best = groups.of[g].inv_lo;
-        let tie = best.cmp_eq(inverse) & id.is_not_after::<true>(groups, g);
-        let wins = Mask::from_bits(same) & (best.cmp_lt(inverse) | tie);
-        groups.of[g].inv_lo = select(wins, inverse, best);
-        id.name::<true>(groups, g, wins);
-        for (weight, x) in groups.of[g].weights.iter_mut().zip([hit.u, hit.v]) {
-            *weight = select(wins, x * inverse, *weight);
-        }
-        any |= wins.any();
+    let best = groups.of[g].inv_lo;
+    let mut wins = found & best.cmp_lt(inverse);
+    let mut ties = (found & best.cmp_eq(inverse)).bits();
+    while ties != 0 {
+        let lane = ties.trailing_zeros() as usize & (V::N - 1);
+        ties &= ties - 1;
+        let not_after = Id { inst, prim: hit.prim[lane] }.is_not_after::<true>(groups, g);
+        wins = wins | not_after & Mask::from_bits(1 << lane);
     }
-    any
+    let group = &mut groups.of[g];
+    group.inv_lo = select(wins, inverse, best);
+    group.slot = merge_lists(wins, hit.prim, group.slot);
+    for (weight, x) in group.weights.iter_mut().zip([hit.u, hit.v]) {
+        *weight = select(wins, x * inverse, *weight);
+    }
+    groups.inst[g] = merge(wins, inst, groups.inst[g]);
+    wins.any()
 }

@@ -1,0 +1,119 @@
+//! What the rays of a chunk have found.
+
+use super::chunk::{RAYS, Set};
+use crate::lanes::{LaneMask, Lanes, Real};
+use crate::ray::{Candidate, HitPacket, Hits, INVALID_ID};
+use crate::shape::BLOCK;
+
+/// The best hits of a chunk so far.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub struct Best<S> {
+    /// Best `t`, or the segment's end.
+    pub t: [S; RAYS],
+    u: [S; RAYS],
+    v: [S; RAYS],
+    prim: [u32; RAYS],
+    inst: [u32; RAYS],
+    /// Any-hit: rays that found something.
+    pub done: Set,
+}
+
+impl<S: Real> Default for Best<S> {
+    fn default() -> Self {
+        let (zero, none) = ([S::ZERO; RAYS], [INVALID_ID; RAYS]);
+        Self { t: zero, u: zero, v: zero, prim: none, inst: none, done: 0 }
+    }
+}
+
+impl<S: Real> Best<S> {
+    /// Nothing found yet, once the ends of the segments are there.
+    #[inline(always)]
+    pub fn start(&mut self) {
+        (self.u, self.v) = ([S::ZERO; RAYS], [S::ZERO; RAYS]);
+        self.prim = [INVALID_ID; RAYS];
+        self.inst = [INVALID_ID; RAYS];
+        self.done = 0;
+    }
+
+    /// Nothing found yet by rays `at..at + N`.
+    #[inline(always)]
+    pub fn clear<V: Lanes<Scalar = S>>(&mut self, at: usize) {
+        self.u[at..at + V::N].fill(S::ZERO);
+        self.v[at..at + V::N].fill(S::ZERO);
+        self.prim[at..at + V::N].fill(INVALID_ID);
+        self.inst[at..at + V::N].fill(INVALID_ID);
+    }
+
+    /// Rays whose segments, as far as they are still looked at, reach to `near`.
+    #[inline(always)]
+    pub fn reaching<V: Lanes<Scalar = S>>(&self, near: S) -> Set {
+        let near = V::splat(near);
+        let reach = |at: usize| Set::from(near.cmp_le(V::load(&self.t[at..])).bits()) << at;
+        (0..RAYS).step_by(V::N).fold(0, |all, at| all | reach(at))
+    }
+
+    /// The hits of rays `at..at + N`.
+    #[inline(always)]
+    pub fn packet<V: Lanes<Scalar = S>>(&self, at: usize) -> HitPacket<V> {
+        let mut hit = HitPacket::new(V::load(&self.t[at..]));
+        (hit.u, hit.v) = (V::load(&self.u[at..]), V::load(&self.v[at..]));
+        hit.prim[..V::N].copy_from_slice(&self.prim[at..at + V::N]);
+        hit.inst[..V::N].copy_from_slice(&self.inst[at..at + V::N]);
+        hit
+    }
+
+    /// Puts back what [`Best::packet`] took out.
+    #[inline(always)]
+    pub fn put<V: Lanes<Scalar = S>>(&mut self, at: usize, hit: &HitPacket<V>) {
+        hit.t.store(&mut self.t[at..]);
+        hit.u.store(&mut self.u[at..]);
+        hit.v.store(&mut self.v[at..]);
+        self.prim[at..at + V::N].copy_from_slice(&hit.prim[..V::N]);
+        self.inst[at..at + V::N].copy_from_slice(&hit.inst[..V::N]);
+    }
+
+    /// Takes in what a kernel found for one ray on a block of triangles, those whose bits are set in `wanted`: usually one. The tie
+    /// rule is that of [`HitPacket::commit`].
+    #[inline(always)]
+    pub fn take(&mut self, ray: usize, wanted: u32, found: &Candidate<S::Octo>, prim: &[u32; BLOCK], inst: u32) {
+        let [mut t, mut u, mut v] = [[S::ZERO; BLOCK]; 3];
+        found.t.store(&mut t);
+        found.u.store(&mut u);
+        found.v.store(&mut v);
+        let mut rest = wanted;
+        while rest != 0 {
+            let slot = rest.trailing_zeros() as usize & (BLOCK - 1);
+            rest &= rest - 1;
+            let ties = t[slot] == self.t[ray] && (inst, prim[slot]) < (self.inst[ray], self.prim[ray]);
+            if t[slot] < self.t[ray] || ties {
+                (self.t[ray], self.u[ray], self.v[ray]) = (t[slot], u[slot], v[slot]);
+                (self.prim[ray], self.inst[ray]) = (prim[slot], inst);
+            }
+        }
+    }
+
+    /// Writes the hits to their places in a batch.
+    #[inline(always)]
+    pub fn scatter(&self, hits: &mut Hits<S>, ids: &[u32]) {
+        let n = hits.t.len();
+        let (t, u, v) = (&mut hits.t[..n], &mut hits.u[..n], &mut hits.v[..n]);
+        let (prim, inst) = (&mut hits.prim[..n], &mut hits.inst[..n]);
+        for (i, &id) in ids.iter().enumerate().take(RAYS) {
+            let id = (id as usize).min(n - 1);
+            t[id] = if self.prim[i] == INVALID_ID { S::INFINITY } else { self.t[i] };
+            (u[id], v[id], prim[id], inst[id]) = (self.u[i], self.v[i], self.prim[i], self.inst[i]);
+        }
+    }
+
+    /// Writes what any-hit found where it found something.
+    #[inline(always)]
+    pub fn scatter_done(&self, out: &mut [u8], ids: &[u32]) {
+        let mut rest = self.done;
+        while rest != 0 {
+            let i = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
+            out[ids[i] as usize] = 1;
+        }
+    }
+}
