@@ -183,6 +183,30 @@ fn ties_go_to_the_smaller_instance() {
     assert!(seen > 5_000, "{seen}");
 }
 
+/// The same among triangles finer than the rays, where the larger instance is met first: its box begins before the other's.
+#[test]
+fn ties_of_fine_instances_go_to_the_smaller_one() {
+    let mut r = Random(78);
+    let mesh = soup(12_000, &mut r);
+    let mut wider = mesh.clone();
+    for corner in [DVec3::splat(-5.0), DVec3::splat(5.0)] {
+        let first = wider.positions.len() as u32;
+        wider.positions.extend([corner, corner * 0.999, corner + DVec3::X * 0.01]);
+        wider.triangles.push([first, first + 1, first + 2]);
+    }
+    let map = r.affine(0.5);
+    let scene = Scene::new(world(&[mesh, wider], &[(0, map), (1, map)]));
+    let (mut hits, mut scratch, mut seen) = (Hits::default(), Scratch::default(), 0);
+    for _ in 0..4 {
+        let rays = camera(r.direction() * 40.0, DVec3::ZERO, 0.1, 32);
+        assert_eq!(differences(&scene, &rays), (0, 0));
+        find("tile").intersect(&scene, &rays, &mut hits, &mut scratch, None);
+        let found = (0..rays.len()).filter(|&i| hits.is_hit(i) && hits.prim[i] < 12_000);
+        seen += found.inspect(|&i| assert_eq!(hits.inst[i], 0, "ray {i}: the larger instance hides its equal")).count();
+    }
+    assert!(seen > 1_000, "{seen}");
+}
+
 /// What is too flat for f32 is left to the other kernels, and still right.
 #[test]
 fn flat_and_huge_maps_are_handed_on() {
