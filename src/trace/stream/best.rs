@@ -30,19 +30,17 @@ impl<S: Real> Best<S> {
     /// Nothing found yet, once the ends of the segments are there.
     #[inline(always)]
     pub fn start(&mut self) {
-        (self.u, self.v) = ([S::ZERO; RAYS], [S::ZERO; RAYS]);
-        self.prim = [INVALID_ID; RAYS];
-        self.inst = [INVALID_ID; RAYS];
+        self.clear(0, RAYS);
         self.done = 0;
     }
 
-    /// Nothing found yet by rays `at..at + N`.
+    /// Forgets the hits of `n` rays from `first` on.
     #[inline(always)]
-    pub fn clear<V: Lanes<Scalar = S>>(&mut self, at: usize) {
-        self.u[at..at + V::N].fill(S::ZERO);
-        self.v[at..at + V::N].fill(S::ZERO);
-        self.prim[at..at + V::N].fill(INVALID_ID);
-        self.inst[at..at + V::N].fill(INVALID_ID);
+    pub fn clear(&mut self, first: usize, n: usize) {
+        self.u[first..first + n].fill(S::ZERO);
+        self.v[first..first + n].fill(S::ZERO);
+        self.prim[first..first + n].fill(INVALID_ID);
+        self.inst[first..first + n].fill(INVALID_ID);
     }
 
     /// Rays whose segments, as far as they are still looked at, reach to `near`.

@@ -43,7 +43,7 @@ impl<S: Real> Visitors<S> {
             self.rays = 0;
             self.best.done = 0;
         }
-        self.best.clear::<V>(k * V::N);
+        self.best.clear(k * V::N, V::N);
         self.chunk.take(k * V::N, packet);
         t_max.store(&mut self.best.t[k * V::N..]);
         self.rays |= Set::from(lanes) << (k * V::N);

@@ -168,9 +168,10 @@ pub fn decide<const ANY: bool, const MANY: bool>(
         let blocks = &exact.world.objects[object as usize].triangles;
         let (at, place) = ((batch.slot[i] >> 3) as usize, (batch.slot[i] & 7) as usize);
         block.set(0, blocks[at].get(place), id.prim);
-        let entered = shapes::enter(exact, id.inst, g, V::splat(f32::INFINITY), exact.bundle.tame[g]);
-        let Some(entered) = entered else { return false };
-        entered
+        match shapes::enter(exact, id.inst, g, V::splat(f32::INFINITY), exact.bundle.tame[g]) {
+            Some(entered) => entered,
+            None => return false,
+        }
     } else {
         block.set(0, batch.corners(i), id.prim);
         let (packet, t_max) = exact.bundle.packet(g);
