@@ -52,6 +52,28 @@ impl<S> Binary<S> {
 }
 
 impl<S: Real> Binary<S> {
+    /// The tree above those nodes that have a number in `numbers`, which becomes the primitive of a leaf.
+    pub fn above(&self, numbers: &[Option<u32>]) -> Self {
+        let mut above = Self { nodes: Vec::new(), prims: Vec::new() };
+        let mut waiting = vec![(0, None)];
+        while let Some((node, slot)) = waiting.pop() {
+            let id = match (numbers[node], self.nodes[node].children()) {
+                (None, Some([left, right])) => {
+                    let id = above.append(slot, 0, 0);
+                    waiting.extend([(right, Some((id, 1))), (left, Some((id, 0)))]);
+                    id
+                }
+                (number, _) => {
+                    let first = above.prims.len() as u32;
+                    above.prims.extend(number);
+                    above.append(slot, first, !1)
+                }
+            };
+            above.nodes[id].bounds = self.nodes[node].bounds;
+        }
+        above
+    }
+
     fn append(&mut self, slot: Slot, left: u32, right: u32) -> usize {
         let id = self.nodes.len();
         self.nodes.push(Node { bounds: Aabb::EMPTY, left, right });

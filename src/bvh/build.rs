@@ -2,8 +2,8 @@
 
 use super::binary::{self, Binary};
 use super::collapse::Plan;
-use super::node::{Child, LEAF_PRIMS, Node, WIDTH};
-use crate::lanes::Real;
+use super::node::{Child, LEAF_PRIMS, Node, WIDE, WIDTH};
+use crate::lanes::{Lanes, Real};
 use crate::math::Aabb;
 
 /// How much time a build may spend on the tree.
@@ -44,8 +44,12 @@ impl From<Preset> for BuildSettings {
 pub struct Tree<S> {
     /// Nodes.
     pub nodes: Vec<Node<S>>,
+    /// Nodes of a second tree over the same leaves, for streams and tiles; none where [`Real::Children`] are eight.
+    pub wide: Vec<Node<S, WIDE>>,
     /// Nodes on the longest path from the root.
     pub depth: u32,
+    /// That of the second tree.
+    pub wide_depth: u32,
     /// Box of everything.
     pub bounds: Aabb<S>,
 }
@@ -61,15 +65,47 @@ pub struct Leaf {
     pub prims: Vec<u32>,
 }
 
+/// A tree seen by its nodes of `W` children.
+pub trait Nodes<S, const W: usize> {
+    /// The nodes in depth-first order, the root first.
+    fn of_width(&self) -> &[Node<S, W>];
+    /// Nodes on the longest path from the root.
+    fn levels(&self) -> u32;
+}
+
+impl<S> Nodes<S, WIDTH> for Tree<S> {
+    #[inline(always)]
+    fn of_width(&self) -> &[Node<S>] {
+        &self.nodes
+    }
+
+    fn levels(&self) -> u32 {
+        self.depth
+    }
+}
+
+impl<S> Nodes<S, WIDE> for Tree<S> {
+    #[inline(always)]
+    fn of_width(&self) -> &[Node<S, WIDE>] {
+        &self.wide
+    }
+
+    fn levels(&self) -> u32 {
+        self.wide_depth
+    }
+}
+
 impl<S: Real> Tree<S> {
     /// A tree over nothing.
     pub fn empty() -> Self {
-        Self { nodes: Vec::new(), depth: 0, bounds: Aabb::EMPTY }
+        Self { nodes: Vec::new(), wide: Vec::new(), depth: 0, wide_depth: 0, bounds: Aabb::EMPTY }
     }
 
-    /// Most entries a depth-first traversal can have on its stack: every level leaves up to seven siblings.
+    /// Most entries a depth-first traversal can have on its stack: every level leaves all siblings but one.
     pub fn stack_bound(&self) -> usize {
-        (WIDTH - 1) * self.depth as usize + 1
+        let [eight, sixteen] =
+            [(WIDTH, self.depth), (WIDE, self.wide_depth)].map(|(w, depth)| (w - 1) * depth as usize);
+        eight.max(sixteen) + 1
     }
 }
 
@@ -94,67 +130,70 @@ pub fn build_by_cost<S: Real>(
         return (Tree::empty(), Vec::new());
     }
     let plan = Plan::new(&binary, classes, each, settings.leaf);
-    let mut emission =
-        Emission { binary: &binary, plan: &plan, nodes: Vec::new(), leaves: Vec::new(), blocks: [0; 256] };
-    let depth = emission.run();
-    let tree = Tree { nodes: emission.nodes, depth, bounds: binary.nodes[0].bounds };
-    (tree, emission.leaves)
+    let (mut leaves, mut blocks, mut numbers) = (Vec::new(), [0; 256], vec![None; binary.nodes.len()]);
+    let (nodes, depth) = emit(&binary, &plan, |source| {
+        let (class, prims) = (plan.class(source), plan.prims(&binary, source));
+        let block = blocks[usize::from(class)];
+        blocks[usize::from(class)] += 1;
+        numbers[source] = Some(leaves.len() as u32);
+        leaves.push(Leaf { class, block, prims });
+        leaves[leaves.len() - 1].child()
+    });
+    let mut tree = Tree { nodes, wide: Vec::new(), depth, wide_depth: 0, bounds: binary.nodes[0].bounds };
+    if S::Children::N >= WIDE {
+        // Leaves of the one tree are what the other is over.
+        let above = binary.above(&numbers);
+        let plan = Plan::new(&above, &vec![0; leaves.len()], &[], 1);
+        (tree.wide, tree.wide_depth) = emit(&above, &plan, |source| leaves[above.prims(source)[0] as usize].child());
+    }
+    (tree, leaves)
 }
 
-struct Emission<'a, S> {
-    binary: &'a Binary<S>,
-    plan: &'a Plan,
-    nodes: Vec<Node<S>>,
-    leaves: Vec<Leaf>,
-    blocks: [u32; 256],
+impl Leaf {
+    /// A reference to it.
+    fn child(&self) -> Child {
+        Child { index: self.block, count: self.prims.len() as u8, class: self.class }
+    }
 }
 
-impl<S: Real> Emission<'_, S> {
-    /// Emits everything depth-first and returns the depth.
-    fn run(&mut self) -> u32 {
-        let mut depth = 0;
-        // Binary node to open, where its index goes, its depth.
-        let mut stack = vec![(0usize, None, 1u32)];
-        let (mut children, mut by_area) = (Vec::with_capacity(WIDTH), Vec::with_capacity(WIDTH));
-        while let Some((source, slot, level)) = stack.pop() {
-            depth = depth.max(level);
-            let id = self.nodes.len();
-            if let Some((parent, slot)) = slot {
-                let parent: &mut Node<S> = &mut self.nodes[parent];
-                parent.child[slot] = id as u32;
-            }
-            self.nodes.push(Node::empty());
-            if self.plan.is_leaf(self.binary, source) {
-                children.clear();
-                children.push(source);
-            } else {
-                self.plan.children(self.binary, source, &mut children);
-            }
-            // Large children first: the order in which any-hit rays look.
-            by_area.clear();
-            by_area.extend(children.iter().map(|&child| (self.binary.nodes[child].bounds.half_area(), child)));
-            by_area.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let first = stack.len();
-            for (slot, &(_, child)) in by_area.iter().enumerate() {
-                let leaf = self.plan.is_leaf(self.binary, child);
-                let reference = if leaf { self.leaf(child) } else { Child::ROOT };
-                self.nodes[id].push(&self.binary.nodes[child].bounds, reference);
-                if !leaf {
-                    stack.push((child, Some((id, slot)), level + 1));
-                }
-            }
-            stack[first..].reverse();
+/// Emits the nodes that are planned depth-first, with what `leaf` makes of the binary nodes that become leaves, and returns them and
+/// the depth.
+fn emit<S: Real, const W: usize>(
+    binary: &Binary<S>,
+    plan: &Plan<W>,
+    mut leaf: impl FnMut(usize) -> Child,
+) -> (Vec<Node<S, W>>, u32) {
+    let (mut nodes, mut depth) = (Vec::<Node<S, W>>::new(), 0);
+    // Binary node to open, where its index goes, its depth.
+    let mut stack = vec![(0usize, None, 1u32)];
+    let (mut children, mut by_area) = (Vec::with_capacity(W), Vec::with_capacity(W));
+    while let Some((source, slot, level)) = stack.pop() {
+        depth = depth.max(level);
+        let id = nodes.len();
+        if let Some((parent, slot)) = slot {
+            let parent: &mut Node<S, W> = &mut nodes[parent];
+            parent.child[slot] = id as u32;
         }
-        depth
+        nodes.push(Node::empty());
+        if plan.is_leaf(binary, source) {
+            children.clear();
+            children.push(source);
+        } else {
+            plan.children(binary, source, &mut children);
+        }
+        // Large children first: the order in which any-hit rays look.
+        by_area.clear();
+        by_area.extend(children.iter().map(|&child| (binary.nodes[child].bounds.half_area(), child)));
+        by_area.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let first = stack.len();
+        for (slot, &(_, child)) in by_area.iter().enumerate() {
+            let is_leaf = plan.is_leaf(binary, child);
+            nodes[id].push(&binary.nodes[child].bounds, if is_leaf { leaf(child) } else { Child::ROOT });
+            if !is_leaf {
+                stack.push((child, Some((id, slot)), level + 1));
+            }
+        }
+        stack[first..].reverse();
     }
-
-    fn leaf(&mut self, source: usize) -> Child {
-        let prims = self.plan.prims(self.binary, source);
-        let class = self.plan.class(source);
-        let block = self.blocks[usize::from(class)];
-        self.blocks[usize::from(class)] += 1;
-        let child = Child { index: block, count: prims.len() as u8, class };
-        self.leaves.push(Leaf { class, block, prims });
-        child
-    }
+    (nodes, depth)
 }

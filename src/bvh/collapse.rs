@@ -1,22 +1,22 @@
-//! From two children to eight: the cheapest cut of the binary tree by dynamic programming.
+//! From two children to eight or sixteen: the cheapest cut of the binary tree by dynamic programming.
 //!
 //! Source: Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs", HPG
-//! 2017, section 3: for every binary node and every i <= 8, the cheapest forest of at most i wide subtrees that
+//! 2017, section 3: for every binary node and every i <= `W`, the cheapest forest of at most i wide subtrees that
 //! covers its primitives.
 
 use super::binary::Binary;
 use super::cost::{Cost, PRIMITIVE};
-use super::node::{LEAF_PRIMS, WIDTH};
+use super::node::LEAF_PRIMS;
 use crate::lanes::Real;
 use crate::math::Aabb;
 
-/// What the cheapest forest does at a binary node.
+/// What the cheapest forests of wide trees with `W` children per node do at every binary node.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct Plan<const W: usize> {
     /// Per node: entry 0 says what to do with one tree: 0 a leaf, else an inner node whose left binary child gets
-    /// that many of the eight children. Entry k > 0, for up to k + 1 trees: 0 "as with one tree fewer", else the
+    /// that many of the `W` children. Entry k > 0, for up to k + 1 trees: 0 "as with one tree fewer", else the
     /// number of trees for the left child.
-    decisions: Vec<[u8; WIDTH]>,
+    decisions: Vec<[u8; W]>,
     /// Primitives below each node.
     counts: Vec<u32>,
     /// Class of all primitives below, or [`MIXED`].
@@ -37,19 +37,19 @@ fn relative_area<S: Real>(bounds: &Aabb<S>, scale: f64) -> f32 {
 /// Primitives of more than one class.
 const MIXED: u8 = u8::MAX;
 
-impl Plan {
+impl<const W: usize> Plan<W> {
     /// Plans the collapse of `tree`, whose primitives have the given classes, to leaves of `most` primitives
     /// (1 to [`LEAF_PRIMS`]). `each`: what a primitive of each class costs, [`PRIMITIVE`] where nothing is said.
     pub fn new<S: Real>(tree: &Binary<S>, class_of: &[u8], each: &[f32], most: usize) -> Self {
         let nodes = &tree.nodes;
         let mut plan = Self {
-            decisions: vec![[0; WIDTH]; nodes.len()],
+            decisions: vec![[0; W]; nodes.len()],
             counts: vec![1; nodes.len()],
             classes: vec![MIXED; nodes.len()],
             most: most.clamp(1, LEAF_PRIMS) as u32,
             each: each.to_vec(),
         };
-        let mut costs = vec![[0f32; WIDTH]; nodes.len()];
+        let mut costs = vec![[0f32; W]; nodes.len()];
         // Extents relative to the root's: areas of a scene of any size fit f32.
         let extent = nodes.first().map_or(0.0, |n| {
             let (lo, hi) = n.bounds.to_f64();
@@ -64,7 +64,7 @@ impl Plan {
                     let prims = tree.prims(i);
                     plan.classes[i] = class_of[prims[0] as usize];
                     plan.counts[i] = prims.len() as u32;
-                    costs[i] = [plan.leaf(i, area, model); WIDTH];
+                    costs[i] = [plan.leaf(i, area, model); W];
                 }
                 Some([l, r]) => {
                     plan.counts[i] = plan.counts[l] + plan.counts[r];
@@ -82,10 +82,10 @@ impl Plan {
         model.leaf(area, self.counts[i], each)
     }
 
-    fn inner(&mut self, i: usize, area: f32, model: Cost, left: &[f32; WIDTH], right: &[f32; WIDTH]) -> [f32; WIDTH] {
+    fn inner(&mut self, i: usize, area: f32, model: Cost, left: &[f32; W], right: &[f32; W]) -> [f32; W] {
         // forests[k]: best split into k + 1 trees, at least one on either side.
-        let mut forests = [(f32::INFINITY, 0u8); WIDTH];
-        for total in 2..=WIDTH {
+        let mut forests = [(f32::INFINITY, 0u8); W];
+        for total in 2..=W {
             for on_left in 1..total {
                 let cost = left[on_left - 1] + right[total - on_left - 1];
                 if cost < forests[total - 1].0 {
@@ -94,12 +94,12 @@ impl Plan {
             }
         }
         let fits = self.counts[i] <= self.most && self.classes[i] != MIXED;
-        let (best_forest, on_left) = forests[WIDTH - 1];
+        let (best_forest, on_left) = forests[W - 1];
         let (as_node, as_leaf) = (model.node(area) + best_forest, self.leaf(i, area, model));
         let leaf = fits && as_leaf <= as_node;
         self.decisions[i][0] = if leaf { 0 } else { on_left };
-        let mut costs = [if leaf { as_leaf } else { as_node }; WIDTH];
-        for k in 1..WIDTH {
+        let mut costs = [if leaf { as_leaf } else { as_node }; W];
+        for k in 1..W {
             let (cost, on_left) = forests[k];
             // Where areas vanish and everything costs the same, a wide node is flatter than a chain.
             if cost < costs[k - 1] || (cost == costs[k - 1] && !leaf) {
@@ -126,7 +126,7 @@ impl Plan {
         found.clear();
         let on_left = usize::from(self.decisions[node][0]);
         let [l, r] = tree.nodes[node].children().expect("an inner node");
-        let mut stack = vec![(r, WIDTH - on_left), (l, on_left)];
+        let mut stack = vec![(r, W - on_left), (l, on_left)];
         while let Some((node, mut trees)) = stack.pop() {
             while trees > 1 && self.decisions[node][trees - 1] == 0 {
                 trees -= 1;

@@ -16,8 +16,8 @@ mod topdown;
 #[cfg(test)]
 mod tests;
 
-pub use build::{BuildSettings, Leaf, Preset, Tree, build, build_by_cost};
+pub use build::{BuildSettings, Leaf, Nodes, Preset, Tree, build, build_by_cost};
 pub use bundle::Bundle;
 pub use cost::PRIMITIVE;
-pub use node::{Child, LEAF_PRIMS, Node, WIDTH};
+pub use node::{Child, LEAF_PRIMS, Node, WIDE, WIDTH};
 pub use quality::Quality;

@@ -1,4 +1,4 @@
-//! The flat 8-wide node.
+//! The flat node: eight children for all engines, sixteen for streams.
 
 use crate::lanes::{Real, each};
 use crate::math::Aabb;
@@ -6,10 +6,13 @@ use crate::math::Aabb;
 /// Children per node.
 pub const WIDTH: usize = 8;
 
+/// Children per node of the wide tree, where a register holds as many numbers.
+pub const WIDE: usize = 16;
+
 /// Most primitives in a leaf.
 pub const LEAF_PRIMS: usize = 8;
 
-/// Eight children's boxes as a structure of arrays. f32: 256 bytes, four cache lines:
+/// The boxes of `W` children as a structure of arrays. f32, eight children: 256 bytes, four cache lines (of sixteen twice as much):
 ///
 /// | bytes | content |
 /// |---|---|
@@ -20,20 +23,21 @@ pub const LEAF_PRIMS: usize = 8;
 /// | 240..244 | `used`: children in use, slots `0..used` |
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub struct Node<S> {
+pub struct Node<S, const W: usize = WIDTH> {
     /// Boxes.
-    pub bounds: [[[S; WIDTH]; 2]; 3],
+    pub bounds: [[[S; W]; 2]; 3],
     /// References.
-    pub child: [u32; WIDTH],
+    pub child: [u32; W],
     /// Primitives per leaf child.
-    pub count: [u8; WIDTH],
+    pub count: [u8; W],
     /// Classes of leaf children.
-    pub class: [u8; WIDTH],
+    pub class: [u8; W],
     /// Children in use, largest area first.
     pub used: u32,
 }
 
 const _: () = assert!(size_of::<Node<f32>>() == 256 && align_of::<Node<f32>>() == 64);
+const _: () = assert!(size_of::<Node<f32, WIDE>>() == 512);
 
 /// A reference to a child: what traversal keeps on its stack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,16 +61,10 @@ impl Child {
     }
 }
 
-impl<S: Real> Node<S> {
+impl<S: Real, const W: usize> Node<S, W> {
     /// A node without children; unused slots hold empty boxes.
     pub fn empty() -> Self {
-        Self {
-            bounds: [[[S::INFINITY; WIDTH], [S::LOWEST; WIDTH]]; 3],
-            child: [0; WIDTH],
-            count: [0; WIDTH],
-            class: [0; WIDTH],
-            used: 0,
-        }
+        Self { bounds: [[[S::INFINITY; W], [S::LOWEST; W]]; 3], child: [0; W], count: [0; W], class: [0; W], used: 0 }
     }
 
     /// Puts a child into the next free slot.

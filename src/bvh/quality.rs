@@ -1,7 +1,7 @@
 //! What a tree is worth: validation and cost.
 
 use super::build::{Leaf, Tree};
-use super::node::{LEAF_PRIMS, WIDTH};
+use super::node::{LEAF_PRIMS, Node};
 use crate::lanes::Real;
 use crate::math::Aabb;
 
@@ -40,8 +40,13 @@ impl<S: Real> Tree<S> {
         q
     }
 
+    /// Bytes of all nodes.
+    pub fn node_bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.wide[..])
+    }
+
     /// Checks everything traversal relies on: each primitive in exactly one leaf, leaf sizes and classes, boxes that
-    /// contain what is below them, the depth, every node reached once.
+    /// contain what is below them, the depth, every node reached once; all of it in either tree.
     ///
     /// # Errors
     /// A sentence about the first violation.
@@ -63,31 +68,37 @@ impl<S: Real> Tree<S> {
         if let Some(p) = seen.iter().position(|s| !s) {
             return Err(format!("primitive {p} is in no leaf"));
         }
-        let mut used_leaves = vec![false; leaves.len()];
-        let reached = self.walk(boxes, leaves, &mut used_leaves)?;
-        if reached != self.nodes.len() || !used_leaves.iter().all(|&u| u) {
-            return Err("a node or a leaf is not reached from the root".into());
+        self.reach_all(&self.nodes, self.depth, boxes, leaves)?;
+        if self.wide.is_empty() {
+            return Ok(());
         }
-        Ok(())
+        self.reach_all(&self.wide, self.wide_depth, boxes, leaves).map_err(|fault| format!("wide tree: {fault}"))
     }
 
-    fn walk(&self, boxes: &[Aabb<S>], leaves: &[Leaf], used: &mut [bool]) -> Result<usize, String> {
+    fn reach_all<const W: usize>(
+        &self,
+        nodes: &[Node<S, W>],
+        depth: u32,
+        boxes: &[Aabb<S>],
+        leaves: &[Leaf],
+    ) -> Result<(), String> {
+        let mut used = vec![false; leaves.len()];
         let by_block: std::collections::HashMap<(u8, u32), usize> =
             leaves.iter().enumerate().map(|(i, l)| ((l.class, l.block), i)).collect();
         let mut reached = 0;
         let mut stack = vec![(0u32, self.bounds, 1u32)];
-        if self.nodes.is_empty() {
+        if nodes.is_empty() {
             stack.clear();
         }
         while let Some((index, bounds, level)) = stack.pop() {
             reached += 1;
-            if level > self.depth || reached > self.nodes.len() {
-                return Err(format!("node {index} is deeper than {} or reached twice", self.depth));
+            if level > depth || reached > nodes.len() {
+                return Err(format!("node {index} is deeper than {depth} or reached twice"));
             }
-            let Some(node) = self.nodes.get(index as usize) else {
+            let Some(node) = nodes.get(index as usize) else {
                 return Err(format!("there is no node {index}"));
             };
-            if node.used == 0 || node.used as usize > WIDTH {
+            if node.used == 0 || node.used as usize > W {
                 return Err(format!("node {index} has {} children", node.used));
             }
             for slot in 0..node.used as usize {
@@ -111,6 +122,9 @@ impl<S: Real> Tree<S> {
                 }
             }
         }
-        Ok(reached)
+        if reached != nodes.len() || !used.iter().all(|&u| u) {
+            return Err("a node or a leaf is not reached from the root".into());
+        }
+        Ok(())
     }
 }

@@ -109,6 +109,10 @@ fn the_tree_does_not_depend_on_threads() {
     for (a, b) in one.nodes.iter().zip(&two.nodes) {
         assert_eq!((a.bounds, a.child, a.count), (b.bounds, b.child, b.count));
     }
+    assert_eq!(one.wide.len(), two.wide.len());
+    for (a, b) in one.wide.iter().zip(&two.wide) {
+        assert_eq!((a.bounds, a.child, a.count), (b.bounds, b.child, b.count));
+    }
 }
 
 #[test]
@@ -126,6 +130,12 @@ fn validation_finds_planted_faults() {
     assert!(fault(&|t, _| t.nodes[1].bounds[0][1][0] += 10.0));
     assert!(fault(&|t, _| t.nodes[1].bounds[0][1][0] -= 0.5));
     assert!(fault(&|t, _| t.depth -= 1));
+    assert!(fault(&|t, _| t.wide_depth -= 1));
+    assert!(fault(&|t, _| t.wide[0].bounds[1][1][0] = -1.0));
+    assert!(fault(&|t, _| t.wide[1].child[0] += 1));
+    assert!(fault(&|t, _| {
+        t.wide.pop();
+    }));
     assert!(
         fault(&|t, _| {
             t.nodes.pop();

@@ -12,54 +12,67 @@ pub fn words_with_bit(words: &[u64; 16], bit: u32) -> u32 {
     has(low) | has(high) << 8
 }
 
-/// Eight words of 64 bits.
+/// `N` words of 64 bits, eight or sixteen.
 #[derive(Clone, Copy, Debug)]
-pub struct Marks(u64x8);
+pub struct Marks<const N: usize>([u64x8; 2]);
 
-impl Marks {
+impl<const N: usize> Marks<N> {
     /// No bit set.
     #[inline(always)]
     pub fn none() -> Self {
-        Self(u64x8::splat(0))
+        Self([u64x8::splat(0); 2])
     }
 
     /// Sets bit `bit` in the words whose bit is set in `words`.
     #[inline(always)]
     #[must_use]
     pub fn with(self, words: u32, bit: u32) -> Self {
-        #[cfg(target_feature = "avx512f")]
-        {
-            use std::arch::x86_64::{_mm512_maskz_set1_epi64, _mm512_storeu_si512};
-            let mut set = [0; 8];
-            // SAFETY: compiled only where the whole build has AVX-512F; the store fills the 64 bytes of `set`.
-            unsafe {
-                let own = _mm512_maskz_set1_epi64(words as u8, 1 << bit);
-                _mm512_storeu_si512(set.as_mut_ptr().cast(), own);
-            }
-            Self(self.0 | u64x8::new(set))
-        }
-        #[cfg(not(target_feature = "avx512f"))]
-        self.with_portable(words, bit)
-    }
-
-    #[cfg(any(test, not(target_feature = "avx512f")))]
-    fn with_portable(self, words: u32, bit: u32) -> Self {
-        const PLACES: u64x8 = u64x8::new([1, 2, 4, 8, 16, 32, 64, 128]);
-        let wanted = (u64x8::splat(words.into()) & PLACES).simd_eq(PLACES);
-        Self(self.0 | u64x8::splat(1 << bit) & wanted)
+        let Self([low, high]) = self;
+        Self([with(low, words, bit), if N > 8 { with(high, words >> 8, bit) } else { high }])
     }
 
     /// Words that are not zero, as bits.
     #[inline(always)]
     pub fn not_zero(self) -> u32 {
-        !self.0.simd_eq(u64x8::splat(0)).to_bitmask() & 0xff
+        let not_zero = |words: u64x8| !words.simd_eq(u64x8::splat(0)).to_bitmask() & 0xff;
+        let Self([low, high]) = self;
+        if N > 8 { not_zero(low) | not_zero(high) << 8 } else { not_zero(low) }
     }
 
     /// The words.
     #[inline(always)]
-    pub fn words(self) -> [u64; 8] {
-        self.0.to_array()
+    pub fn words(self) -> [u64; N] {
+        let mut words = [0; N];
+        for (to, from) in words.chunks_exact_mut(8).zip(self.0) {
+            to.copy_from_slice(&from.to_array());
+        }
+        words
     }
+}
+
+/// Sets bit `bit` in those of eight words whose bit is set in `wanted`.
+#[inline(always)]
+fn with(words: u64x8, wanted: u32, bit: u32) -> u64x8 {
+    #[cfg(target_feature = "avx512f")]
+    {
+        use std::arch::x86_64::{_mm512_maskz_set1_epi64, _mm512_storeu_si512};
+        let mut set = [0; 8];
+        // SAFETY: compiled only where the whole build has AVX-512F; the store fills the 64 bytes of `set`.
+        unsafe {
+            let own = _mm512_maskz_set1_epi64(wanted as u8, 1 << bit);
+            _mm512_storeu_si512(set.as_mut_ptr().cast(), own);
+        }
+        words | u64x8::new(set)
+    }
+    #[cfg(not(target_feature = "avx512f"))]
+    with_portable(words, wanted, bit)
+}
+
+#[cfg(any(test, not(target_feature = "avx512f")))]
+fn with_portable(words: u64x8, wanted: u32, bit: u32) -> u64x8 {
+    const PLACES: u64x8 = u64x8::new([1, 2, 4, 8, 16, 32, 64, 128]);
+    let wanted = (u64x8::splat(wanted.into()) & PLACES).simd_eq(PLACES);
+    words | u64x8::splat(1 << bit) & wanted
 }
 
 #[cfg(test)]
@@ -77,11 +90,16 @@ mod tests {
 
     #[test]
     fn marks_are_set_where_they_are_wanted() {
-        let marks = Marks(u64x8::new([0, 1, 2, 3, 4, 5, 6, 7]));
-        for (words, bit) in [(0b1010_0110, 63), (0xff, 0), (0, 5), (1, 40)] {
+        let eight = u64x8::new([0, 1, 2, 3, 4, 5, 6, 7]);
+        for (words, bit) in [(0b1010_0110, 63), (0xff, 0), (0, 5), (1, 40), (0xd00f, 17)] {
             let want: [u64; 8] = std::array::from_fn(|i| i as u64 | u64::from(words >> i & 1) << bit);
-            assert_eq!((marks.with(words, bit).words(), marks.with_portable(words, bit).words()), (want, want));
+            assert_eq!(with_portable(eight, words, bit).to_array(), want);
+            assert_eq!(Marks::<8>([eight; 2]).with(words, bit).words(), want);
+            let want: [u64; 16] = std::array::from_fn(|i| (i % 8) as u64 | u64::from(words >> i & 1) << bit);
+            assert_eq!(Marks::<16>([eight; 2]).with(words, bit).words(), want);
         }
-        assert_eq!((marks.not_zero(), Marks::none().not_zero()), (0xfe, 0));
+        assert_eq!((Marks::<8>([eight; 2]).not_zero(), Marks::<8>::none().not_zero()), (0xfe, 0));
+        let marks = Marks::<16>([eight, eight << 7]).with(0x100, 5);
+        assert_eq!((marks.not_zero(), Marks::<16>::none().not_zero()), (0xfffe, 0));
     }
 }

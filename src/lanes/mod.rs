@@ -158,6 +158,8 @@ pub trait Real:
     type Octo: Lanes<Scalar = Self>;
     /// The widest vector of this scalar that fills 64 bytes: what shading computes in.
     type Wide: Lanes<Scalar = Self>;
+    /// What the nodes of streams and tiles are tested with: as many lanes as one register holds, but eight at least.
+    type Children: Lanes<Scalar = Self>;
     /// Half the distance from 1 to the next larger number.
     const EPSILON: Self;
     /// Smallest positive normal number.

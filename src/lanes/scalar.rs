@@ -18,7 +18,7 @@ impl LaneMask for bool {
 }
 
 macro_rules! scalar_lanes {
-    ($t:ident, $octo:ident, $wide:ident) => {
+    ($t:ident, $octo:ident, $wide:ident, $children:ident) => {
         impl Lanes for $t {
             type Scalar = $t;
             type Mask = bool;
@@ -87,6 +87,7 @@ macro_rules! scalar_lanes {
         impl Real for $t {
             type Octo = super::$octo;
             type Wide = super::$wide;
+            type Children = super::$children;
             const EPSILON: Self = $t::EPSILON / 2.0;
             const MIN_POSITIVE: Self = $t::MIN_POSITIVE;
             const MAX: Self = $t::MAX;
@@ -116,5 +117,8 @@ macro_rules! scalar_lanes {
     };
 }
 
-scalar_lanes!(f32, f32x8, f32x16);
-scalar_lanes!(f64, f64x8, f64x8);
+#[cfg(target_feature = "avx512f")]
+scalar_lanes!(f32, f32x8, f32x16, f32x16);
+#[cfg(not(target_feature = "avx512f"))]
+scalar_lanes!(f32, f32x8, f32x16, f32x8);
+scalar_lanes!(f64, f64x8, f64x8, f64x8);

@@ -6,16 +6,9 @@
 use super::{LaneMask, Lanes};
 use wide::{f32x4, f32x8, f32x16, u16x8, u32x16};
 
-/// The same eight values in both halves.
-#[inline(always)]
-pub fn twice(v: f32x8) -> f32x16 {
-    let [a, b, c, d, e, f, g, h] = v.to_array();
-    f32x16::new([a, b, c, d, e, f, g, h, a, b, c, d, e, f, g, h])
-}
-
 /// The lower and the upper half.
 #[inline(always)]
-pub fn halves(v: f32x16) -> [f32x8; 2] {
+fn halves(v: f32x16) -> [f32x8; 2] {
     bytemuck::cast(v.to_array())
 }
 
@@ -75,9 +68,24 @@ pub fn prefetch_either<A, B>(first: &[A], second: &[B], from_second: bool, i: us
     let _ = (first, second, from_second, i);
 }
 
-/// The least of eight keys and its first position.
+/// The least of `N` keys, eight or sixteen, and its first position.
 #[inline(always)]
-pub fn least_key(keys: &[u16; 8]) -> (u16, usize) {
+pub fn least_key<const N: usize>(keys: &[u16; N]) -> (u16, usize) {
+    let eight = |k: usize| {
+        let mut some = [u16::MAX; 8];
+        some.copy_from_slice(&keys[8 * k..8 * k + 8]);
+        least_of_eight(&some)
+    };
+    let mut best = eight(0);
+    for k in 1..N / 8 {
+        let (least, at) = eight(k);
+        best = if least < best.0 { (least, at + 8 * k) } else { best };
+    }
+    best
+}
+
+#[inline(always)]
+fn least_of_eight(keys: &[u16; 8]) -> (u16, usize) {
     #[cfg(target_feature = "sse4.1")]
     {
         use std::arch::x86_64::{__m128i, _mm_cvtsi128_si32, _mm_minpos_epu16};
@@ -90,22 +98,31 @@ pub fn least_key(keys: &[u16; 8]) -> (u16, usize) {
     least_key_portable(keys)
 }
 
-/// The keys with the one at `position` made the greatest possible. Written as one vector: the next look for the
+/// The keys with the one at `position` made the greatest possible. Written as vectors: the next look for the
 /// least key would have to wait for a single lane's store.
 #[inline(always)]
-pub fn without_key(keys: &[u16; 8], position: usize) -> [u16; 8] {
+pub fn without_key<const N: usize>(keys: &[u16; N], position: usize) -> [u16; N] {
     const OWN: u16x8 = u16x8::new([0, 1, 2, 3, 4, 5, 6, 7]);
-    (u16x8::new(*keys) | u16x8::splat(position as u16).simd_eq(OWN)).to_array()
+    let mut rest = *keys;
+    for k in 0..N / 8 {
+        let mut some = [0; 8];
+        some.copy_from_slice(&keys[8 * k..8 * k + 8]);
+        let own = u16x8::splat(position as u16).simd_eq(OWN + u16x8::splat(8 * k as u16));
+        rest[8 * k..8 * k + 8].copy_from_slice(&(u16x8::new(some) | own).to_array());
+    }
+    rest
 }
 
 /// The upper halves of the bits of the numbers in `wanted`, all ones elsewhere: keys in the order of the numbers, if
-/// none is negative.
+/// none is negative. `N`: the vector's lanes.
 #[inline(always)]
-pub fn upper_halves(v: f32x8, wanted: u32) -> [u16; 8] {
-    let wanted = <<f32x8 as Lanes>::Mask as LaneMask>::from_bits(wanted);
-    let all_ones = f32x8::splat(f32::from_bits(u32::MAX));
-    let marked: [f32; 8] = <f32x8 as Lanes>::select(wanted, v, all_ones).to_array();
-    marked.map(|x| (x.to_bits() >> 16) as u16)
+pub fn upper_halves<V: Lanes<Scalar = f32>, const N: usize>(v: V, wanted: u32) -> [u16; N] {
+    let (mut marked, mut keys) = ([0.0f32; N], [0; N]);
+    V::select(V::Mask::from_bits(wanted), v, V::splat(f32::from_bits(u32::MAX))).store(&mut marked);
+    for (key, x) in keys.iter_mut().zip(marked) {
+        *key = (x.to_bits() >> 16) as u16;
+    }
+    keys
 }
 
 /// The least lane. No NaNs.
@@ -279,12 +296,18 @@ mod tests {
     fn the_least_key_is_the_first_of_the_least() {
         let mut next = numbers();
         for _ in 0..1000 {
-            let keys: [u16; 8] = std::array::from_fn(|_| (next() % 9) as u16 * 8191);
-            let least = *keys.iter().min().unwrap();
-            let want = (least, keys.iter().position(|&k| k == least).unwrap());
-            assert_eq!((least_key(&keys), least_key_portable(&keys)), (want, want));
-            let mut rest = keys;
+            let keys: [u16; 16] = std::array::from_fn(|_| (next() % 19) as u16 * 3449);
+            let least = |keys: &[u16]| {
+                let least = *keys.iter().min().unwrap();
+                (least, keys.iter().position(|&k| k == least).unwrap())
+            };
+            let (want, mut rest) = (least(&keys), keys);
             rest[want.1] = u16::MAX;
+            assert_eq!((least_key(&keys), without_key(&keys, want.1)), (want, rest));
+            let keys: [u16; 8] = keys[8..].try_into().unwrap();
+            let (want, mut rest) = (least(&keys), keys);
+            rest[want.1] = u16::MAX;
+            assert_eq!((least_key(&keys), least_key_portable(&keys)), (want, want));
             assert_eq!(without_key(&keys, want.1), rest);
         }
     }
@@ -311,7 +334,7 @@ mod tests {
     #[test]
     fn upper_halves_keep_the_order() {
         let v = f32x8::new([0.0, 1.0, 2.5, 1e-30, 7e30, f32::INFINITY, 1.0, 3.0]);
-        assert_eq!(upper_halves(v, 0x6f), [0, 0x3f80, 0x4020, 0x0da2, 0xffff, 0x7f80, 0x3f80, 0xffff]);
+        assert_eq!(upper_halves::<f32x8, 8>(v, 0x6f), [0, 0x3f80, 0x4020, 0x0da2, 0xffff, 0x7f80, 0x3f80, 0xffff]);
     }
 
     #[test]
@@ -347,8 +370,7 @@ mod tests {
         assert_eq!((positions(&list, u32::MAX), positions(&list, 10), positions(&list, 1)), (0x0842, 1 << 10, 0));
         let v = f32x16::new(std::array::from_fn(|i| if i % 3 == 0 { -0.0 } else { f32::INFINITY }));
         assert_eq!(signs(v), 0b1001_0010_0100_1001);
-        let half = f32x8::new([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
-        assert_eq!(twice(half).to_array()[..8], half.to_array());
-        assert_eq!(twice(half).to_array()[8..], half.to_array());
+        let v = f32x16::new(std::array::from_fn(|i| i as f32));
+        assert_eq!(halves(v).map(|half| half.to_array()[0]), [0.0, 8.0]);
     }
 }

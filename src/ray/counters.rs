@@ -6,12 +6,14 @@
 pub struct Counters {
     /// Rays traced (live ones).
     pub rays: u64,
-    /// Inner nodes visited by packets (or single rays); each visit tests eight boxes against the packet's bounds.
+    /// Inner nodes visited by packets (or single rays); each visit tests all boxes against the packet's bounds.
     pub nodes: u64,
+    /// Of these, nodes of sixteen boxes instead of eight.
+    pub wide_nodes: u64,
     /// Tests of one box against all lanes of a packet, after the packet's bounds met it.
     pub boxes: u64,
-    /// Tests of a box against one ray, or against the bounds of several: eight per node visit of a packet or tile, eight per
-    /// ray and node visit of a stream, and one per lane where a box is tested against all lanes.
+    /// Tests of a box against one ray, or against the bounds of several: as many per node visit of a packet or tile as a node
+    /// has, as many per ray and node visit of a stream, and one per lane where a box is tested against all lanes.
     pub box_lanes: u64,
     /// Leaves visited.
     pub leaves: u64,
@@ -43,6 +45,7 @@ impl std::ops::AddAssign for Counters {
     fn add_assign(&mut self, o: Self) {
         self.rays += o.rays;
         self.nodes += o.nodes;
+        self.wide_nodes += o.wide_nodes;
         self.boxes += o.boxes;
         self.box_lanes += o.box_lanes;
         self.leaves += o.leaves;

@@ -15,6 +15,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use crate::bvh::{Node, WIDE};
 use crate::camera::{FILE_TILE, Tiling};
 use crate::error::{Error, Result};
 use crate::measure::raysets::{Query, RayKind};
@@ -127,9 +128,9 @@ pub fn work<S: Engines>(
     all.iter().for_each(|c| total += **c);
     let spread = |value: &dyn Fn(&Counters) -> f64| Spread::of(all.iter().map(|c| value(c)).collect());
     let share = |active: u64, lanes: u64| 100.0 * active as f64 / lanes.max(1) as f64;
-    let (node_bytes, leaf_bytes) = sizes(world);
+    let leaf_bytes = bytes_of_leaf(world);
     let rays = total.rays.max(1) as f64;
-    let bytes = |c: &Counters| c.nodes as f64 * node_bytes + c.leaves as f64 * leaf_bytes;
+    let bytes = |c: &Counters| bytes_of_nodes::<S>(c) + c.leaves as f64 * leaf_bytes;
     let (depths, packets_of_many) = divergence(world, batches, lanes)?;
     let (seconds, shares) = clock(engine, world, batches, query, stop)?;
     Ok(Work {
@@ -204,11 +205,16 @@ fn divergence<S: Engines>(world: &World<S>, batches: &[Rays<S>], lanes: usize) -
     Ok((found.into_iter().flat_map(|(depths, _)| depths).collect(), many))
 }
 
-/// Bytes of a node and, on average, of a leaf block.
-fn sizes<S: Engines>(world: &World<S>) -> (f64, f64) {
+/// Bytes of the nodes visited.
+fn bytes_of_nodes<S: Engines>(counters: &Counters) -> f64 {
+    let wide = counters.wide_nodes as f64;
+    (counters.nodes as f64 - wide) * size_of::<Node<S>>() as f64 + wide * size_of::<Node<S, WIDE>>() as f64
+}
+
+/// Bytes of a leaf block on average.
+fn bytes_of_leaf<S: Engines>(world: &World<S>) -> f64 {
     let stats = world.stats();
-    let mean = |bytes: u64, count: u64| bytes as f64 / count.max(1) as f64;
-    (mean(stats.node_bytes, stats.nodes), mean(stats.prim_bytes, stats.leaves))
+    stats.prim_bytes as f64 / stats.leaves.max(1) as f64
 }
 
 /// Seconds for all batches at their fastest, and the fit of the batches' times to their counts.

@@ -314,7 +314,7 @@ impl<S: Real> World<S> {
             stats.nodes += q.nodes as u64;
             stats.leaves += q.leaves as u64;
             stats.depth = stats.depth.max(object.tree.depth);
-            stats.node_bytes += size_of_val(&object.tree.nodes[..]) as u64;
+            stats.node_bytes += object.tree.node_bytes() as u64;
             stats.prim_bytes += object.prim_bytes() as u64;
             if q.prims > most {
                 (most, stats.sah_cost) = (q.prims, q.sah_cost);
@@ -324,7 +324,7 @@ impl<S: Real> World<S> {
         stats.nodes += q.nodes as u64;
         stats.leaves += q.leaves as u64;
         stats.depth = stats.depth.max(self.top.depth);
-        stats.node_bytes += size_of_val(&self.top.nodes[..]) as u64;
+        stats.node_bytes += self.top.node_bytes() as u64;
         stats.prim_bytes += (size_of_val(&self.instances[..]) + size_of_val(&self.top_leaves[..])) as u64;
         stats
     }

@@ -1,4 +1,4 @@
-//! Bounds over all rays of a chunk: which of eight boxes none of them meets.
+//! Bounds over all rays of a chunk: which of a node's boxes none of them meets.
 //!
 //! As for packets ([`crate::bvh::Bundle`]): the same monotone expression as the box test of one ray, at the ends of
 //! the intervals, so that a box that a ray meets is never rejected. Short rays that start near each other, such as
@@ -6,7 +6,6 @@
 
 use super::chunk::{Chunk, RAYS};
 use super::node::Planes;
-use crate::bvh::WIDTH;
 use crate::lanes::{LaneMask, Lanes, Real, each};
 use crate::ray::slab::{Interval, pad};
 
@@ -37,19 +36,19 @@ impl<S: Real> Bounds<S> {
         Self { org, rcp, t_min: range(&chunk.t_min).0, t_max: range(t).1 }
     }
 
-    /// Children that some ray of `octant` may meet, as bits.
+    /// Children that some ray of `octant` may meet, as bits. `E`: vectors of `W` children.
     #[inline(always)]
-    pub fn children(&self, planes: &Planes<'_, S>, octant: usize) -> u32 {
-        let splat = S::Octo::splat;
+    pub fn children<E: Lanes<Scalar = S>, const W: usize>(&self, planes: &Planes<'_, S, W>, octant: usize) -> u32 {
+        let splat = E::splat;
         let [x, y, z] = each(|a| {
             let (low, high) = self.org[a];
             let (org_near, org_far) = if octant >> a & 1 == 0 { (high, low) } else { (low, high) };
             let (r0, r1) = (splat(self.rcp[a].0), splat(self.rcp[a].1));
-            let enter = S::Octo::load(planes[a].0) - splat(org_near);
-            let leave = S::Octo::load(planes[a].1) - splat(org_far);
+            let enter = E::load(planes[a].0) - splat(org_near);
+            let leave = E::load(planes[a].1) - splat(org_far);
             ((enter * r0).fast_min(enter * r1), (leave * r0).fast_max(leave * r1))
         });
         let interval = Interval { near: x.0.fast_max(y.0).fast_max(z.0), far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
-        interval.meets(splat(self.t_min), splat(self.t_max)).bits() & ((1 << WIDTH) - 1)
+        interval.meets(splat(self.t_min), splat(self.t_max)).bits() & E::ALL
     }
 }

@@ -1,27 +1,30 @@
-//! A chunk's rays against the eight boxes of a node.
+//! A chunk's rays against the boxes of a node.
 
 use super::chunk::{Chunk, RAYS, Set};
-use crate::bvh::{Node, WIDTH};
+use crate::bvh::Node;
 use crate::lanes::marks::Marks;
 use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::slab::{Interval, PAD, pad};
 
-/// From this many rays on they are tested as vectors.
-pub const DENSE: u32 = 48;
+/// From this many rays on they are tested as vectors, if that is less to do.
+pub const DENSE: u32 = 32;
 
-/// Which rays meet which child.
-pub struct Met<S> {
+/// What one ray's test of a node takes, in halves of what a vector's test of one box does.
+const ONE: u32 = 1;
+
+/// Which rays meet which child of a node that has `W`.
+pub struct Met<S, const W: usize> {
     /// Children that some ray meets, as bits.
     pub children: u32,
     /// Rays that meet each child: of the first and of the second 64 of the chunk.
-    halves: [[u64; WIDTH]; 2],
+    halves: [[u64; W]; 2],
     /// Order of the children.
-    pub near: [S; WIDTH],
+    pub near: [S; W],
     /// Whether `near` is where the first ray enters.
     pub bound: bool,
 }
 
-impl<S> Met<S> {
+impl<S, const W: usize> Met<S, W> {
     /// Rays that meet a child.
     #[inline(always)]
     pub fn rays(&self, slot: usize) -> Set {
@@ -30,61 +33,66 @@ impl<S> Met<S> {
 }
 
 /// The planes of all children that rays of one octant meet first and last, axis by axis.
-pub type Planes<'a, S> = [(&'a [S; WIDTH], &'a [S; WIDTH]); 3];
+pub type Planes<'a, S, const W: usize> = [(&'a [S; W], &'a [S; W]); 3];
 
 #[inline(always)]
-fn planes<S>(node: &Node<S>, octant: usize) -> Planes<'_, S> {
+fn planes<S, const W: usize>(node: &Node<S, W>, octant: usize) -> Planes<'_, S, W> {
     each(|axis| {
         let [low, high] = &node.bounds[axis];
         if octant >> axis & 1 == 0 { (low, high) } else { (high, low) }
     })
 }
 
-/// Tests `rays` of a chunk, all of one octant, whose segments end at `t`.
+/// Tests `rays` of a chunk, all of one octant, whose segments end at `t`. `V`: vectors of rays; `E`: of a node's children.
 #[inline(always)]
-pub fn meet<V: Lanes, const ANY: bool>(
-    node: &Node<V::Scalar>,
+pub fn meet<V: Lanes, E: Lanes<Scalar = V::Scalar>, const W: usize, const ANY: bool>(
+    node: &Node<V::Scalar, W>,
     chunk: &Chunk<V::Scalar>,
     t: &[V::Scalar; RAYS],
     rays: Set,
     octant: usize,
-) -> Met<V::Scalar> {
-    if rays.count_ones() >= DENSE {
-        dense::<V, ANY>(node, chunk, t, rays, octant)
-    } else {
-        sparse::<V::Scalar, ANY>(node, chunk, t, rays, octant)
+) -> Met<V::Scalar, W> {
+    let many = rays.count_ones();
+    if many >= DENSE
+        && let Some(bounds) = &chunk.bounds
+    {
+        let children = bounds.children::<E, W>(&planes(node, octant), octant) & ((1 << node.used) - 1);
+        if children.count_ones() * chunk.len.div_ceil(V::N) as u32 * 2 <= many * ONE {
+            return dense::<V, W, ANY>(node, chunk, t, rays, (octant, children));
+        }
     }
+    sparse::<E, W, ANY>(node, chunk, t, rays, octant)
 }
 
 /// One ray after the other against all children.
 #[inline(always)]
-fn sparse<S: Real, const ANY: bool>(
-    node: &Node<S>,
-    chunk: &Chunk<S>,
-    t: &[S; RAYS],
+fn sparse<E: Lanes, const W: usize, const ANY: bool>(
+    node: &Node<E::Scalar, W>,
+    chunk: &Chunk<E::Scalar>,
+    t: &[E::Scalar; RAYS],
     rays: Set,
     octant: usize,
-) -> Met<S> {
-    let planes = map3(planes(node, octant), |(near, far)| (S::Octo::load(near), S::Octo::load(far)));
+) -> Met<E::Scalar, W> {
+    let planes = map3(planes(node, octant), |(near, far)| (E::load(near), E::load(far)));
     if chunk.steep {
-        return one_by_one::<S, ANY>(rays, |ray| exact(&planes, chunk, t, ray));
+        return one_by_one::<E, W, ANY>(rays, |ray| exact(&planes, chunk, t, ray));
     }
-    let mut met = one_by_one::<S, ANY>(rays, |ray| quick(&planes, chunk, t, ray));
+    let mut met = one_by_one::<E, W, ANY>(rays, |ray| quick(&planes, chunk, t, ray));
     if !ANY {
-        let near = S::Octo::load(&met.near);
-        (near - near.abs() * S::Octo::splat(S::from_f64(WIDER * S::EPSILON.to_f64()))).store(&mut met.near);
+        let near = E::load(&met.near);
+        (near - near.abs() * E::constant(WIDER * E::Scalar::EPSILON.to_f64())).store(&mut met.near);
     }
     met
 }
 
 /// `test(i)`: which children ray `i` meets, and where it enters them.
 #[inline(always)]
-fn one_by_one<S: Real, const ANY: bool>(
+fn one_by_one<E: Lanes, const W: usize, const ANY: bool>(
     rays: Set,
-    test: impl Fn(usize) -> (<S::Octo as Lanes>::Mask, S::Octo),
-) -> Met<S> {
-    let mut marks = [Marks::none(); 2];
-    let mut first = S::Octo::splat(S::INFINITY);
+    test: impl Fn(usize) -> (E::Mask, E),
+) -> Met<E::Scalar, W> {
+    let mut marks = [Marks::<W>::none(); 2];
+    let mut first = E::splat(E::Scalar::INFINITY);
     for (half, marks) in marks.iter_mut().enumerate() {
         let mut rest = (rays >> (64 * half)) as u64;
         while rest != 0 {
@@ -92,36 +100,33 @@ fn one_by_one<S: Real, const ANY: bool>(
             rest &= rest - 1;
             let (meets, near) = test((64 * half + i as usize) & (RAYS - 1));
             if !ANY {
-                first = S::Octo::select(meets, near.fast_min(first), first);
+                first = E::select(meets, near.fast_min(first), first);
             }
             *marks = marks.with(meets.bits(), i);
         }
     }
-    let mut near = [S::ZERO; WIDTH];
-    first.store(&mut near);
+    let mut near = [E::Scalar::ZERO; W];
+    if !ANY {
+        first.store(&mut near);
+    }
     // Slots without a child are empty boxes, which no ray of an octant meets.
     let [low, high] = marks;
     Met { children: low.not_zero() | high.not_zero(), halves: [low.words(), high.words()], near, bound: true }
 }
 
-/// The near and far planes of eight boxes, axis by axis.
-type Eight<V> = [(V, V); 3];
+/// The near and far planes of a node's boxes, axis by axis.
+type Boxes<E> = [(E, E); 3];
 
 /// The box test of all engines.
 #[inline(always)]
-fn exact<S: Real>(
-    planes: &Eight<S::Octo>,
-    chunk: &Chunk<S>,
-    t: &[S; RAYS],
-    ray: usize,
-) -> (<S::Octo as Lanes>::Mask, S::Octo) {
+fn exact<E: Lanes>(planes: &Boxes<E>, chunk: &Chunk<E::Scalar>, t: &[E::Scalar; RAYS], ray: usize) -> (E::Mask, E) {
     let [x, y, z] = each(|a| {
-        let (org, rcp) = (S::Octo::splat(chunk.org[a][ray]), S::Octo::splat(chunk.rcp[a][ray]));
+        let (org, rcp) = (E::splat(chunk.org[a][ray]), E::splat(chunk.rcp[a][ray]));
         ((planes[a].0 - org) * rcp, (planes[a].1 - org) * rcp)
     });
     let near = x.0.fast_max(y.0).fast_max(z.0);
     let interval = Interval { near, far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
-    (interval.meets(S::Octo::splat(chunk.t_min[ray]), S::Octo::splat(t[ray])), near)
+    (interval.meets(E::splat(chunk.t_min[ray]), E::splat(t[ray])), near)
 }
 
 /// How much more than [`pad`] the ends are moved outwards by [`quick`], in half ulps.
@@ -135,40 +140,34 @@ const WIDER: f64 = 12.0;
 /// [`exact`] or more, in half the operations: planes times reciprocals less what the origin contributes, fused. It may meet boxes
 /// that `exact` just misses, and never the other way round.
 #[inline(always)]
-fn quick<S: Real>(
-    planes: &Eight<S::Octo>,
-    chunk: &Chunk<S>,
-    t: &[S; RAYS],
-    ray: usize,
-) -> (<S::Octo as Lanes>::Mask, S::Octo) {
+fn quick<E: Lanes>(planes: &Boxes<E>, chunk: &Chunk<E::Scalar>, t: &[E::Scalar; RAYS], ray: usize) -> (E::Mask, E) {
     let [x, y, z] = each(|a| {
-        let rcp = S::Octo::splat(chunk.rcp[a][ray]);
-        let [near, far] = [0, 1].map(|end: usize| S::Octo::splat(chunk.shift[end][a][ray]));
+        let rcp = E::splat(chunk.rcp[a][ray]);
+        let [near, far] = [0, 1].map(|end: usize| E::splat(chunk.shift[end][a][ray]));
         (planes[a].0.mul_add(rcp, -near), planes[a].1.mul_add(rcp, -far))
     });
     let near = x.0.fast_max(y.0).fast_max(z.0);
-    let far = S::Octo::splat(t[ray]).fast_min(x.1.fast_min(y.1).fast_min(z.1));
-    let wider = S::Octo::splat(S::from_f64((PAD + WIDER) * S::EPSILON.to_f64()));
+    let far = E::splat(t[ray]).fast_min(x.1.fast_min(y.1).fast_min(z.1));
     // As in `pad`, -inf becomes NaN and misses.
-    let far = far.abs().mul_add(wider, far);
-    (near.fast_max(S::Octo::splat(chunk.t_min[ray])).cmp_le(far), near)
+    let far = far.abs().mul_add(E::constant((PAD + WIDER) * E::Scalar::EPSILON.to_f64()), far);
+    (near.fast_max(E::splat(chunk.t_min[ray])).cmp_le(far), near)
 }
 
-/// One child after the other against vectors of rays.
-#[inline(always)]
-fn dense<V: Lanes, const ANY: bool>(
-    node: &Node<V::Scalar>,
+/// One child of `children` after the other against vectors of rays. Not inlined: where chunks go through many instances it is
+/// rare, and they lose a tenth of their rate to it.
+#[inline(never)]
+fn dense<V: Lanes, const W: usize, const ANY: bool>(
+    node: &Node<V::Scalar, W>,
     chunk: &Chunk<V::Scalar>,
     t: &[V::Scalar; RAYS],
     rays: Set,
-    octant: usize,
-) -> Met<V::Scalar> {
+    (octant, children): (usize, u32),
+) -> Met<V::Scalar, W> {
     let planes = planes(node, octant);
-    let mut met = Met { children: 0, halves: [[0; WIDTH]; 2], near: [V::Scalar::ZERO; WIDTH], bound: false };
-    let mut rest = chunk.bounds.as_ref().map_or(u32::MAX, |bounds| bounds.children(&planes, octant));
-    rest &= (1 << node.used) - 1;
+    let mut met = Met { children: 0, halves: [[0; W]; 2], near: [V::Scalar::ZERO; W], bound: false };
+    let mut rest = children;
     while rest != 0 {
-        let child = rest.trailing_zeros() as usize & (WIDTH - 1);
+        let child = rest.trailing_zeros() as usize & (W - 1);
         rest &= rest - 1;
         let corner = map3(planes, |(near, far)| (V::splat(near[child]), V::splat(far[child])));
         let mut meeting = [0u64; 2];
@@ -203,13 +202,13 @@ fn dense<V: Lanes, const ANY: bool>(
 mod tests {
     use super::super::OCTANTS;
     use super::*;
-    use crate::bvh::Child;
-    use crate::lanes::{f32x16, f64x8};
+    use crate::bvh::{Child, WIDE, WIDTH};
+    use crate::lanes::{f32x8, f32x16, f64x8};
     use crate::math::Aabb;
     use crate::ray::Rays;
 
     /// Rays of one octant near boxes, some far from the origin, some nearly along an axis.
-    fn check<V: Lanes>() {
+    fn check<V: Lanes, E: Lanes<Scalar = V::Scalar>, const W: usize>() {
         let mut state = 11u64;
         let mut next = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -229,8 +228,8 @@ mod tests {
                 let t_min = V::Scalar::from_f64(if i % 5 == 0 { -2.0 } else { 0.0 });
                 rays.set(i, org, dir, t_min, V::Scalar::from_f64(if i % 2 == 0 { 3.0 } else { f64::INFINITY }));
             }
-            let mut node = Node::empty();
-            for _ in 0..6 {
+            let mut node = Node::<V::Scalar, W>::empty();
+            for _ in 0..W - 2 {
                 let lo = each(|_| V::Scalar::from_f64(far + 8.0 * next() - 4.0));
                 let bounds = Aabb { lo, hi: each(|a| lo[a] + V::Scalar::from_f64(2.0 * next())) };
                 node.push(&bounds, Child::ROOT);
@@ -246,12 +245,10 @@ mod tests {
                 of_octant |= if own == octant { alike } else { 0 };
                 rest &= !alike;
             }
-            let planes = map3(planes(&node, octant), |(near, far)| {
-                (<V::Scalar as Real>::Octo::load(near), <V::Scalar as Real>::Octo::load(far))
-            });
-            let meeting = one_by_one::<V::Scalar, false>(of_octant, |ray| exact(&planes, &chunk, &t, ray));
-            let met = sparse::<V::Scalar, false>(&node, &chunk, &t, of_octant, octant);
-            for slot in 0..WIDTH {
+            let planes = map3(planes(&node, octant), |(near, far)| (E::load(near), E::load(far)));
+            let meeting = one_by_one::<E, W, false>(of_octant, |ray| exact(&planes, &chunk, &t, ray));
+            let met = sparse::<E, W, false>(&node, &chunk, &t, of_octant, octant);
+            for slot in 0..W {
                 assert_eq!(meeting.rays(slot) & !met.rays(slot), 0, "a ray misses a box that it meets");
                 assert!(meeting.rays(slot) == 0 || met.near[slot] <= meeting.near[slot]);
                 exactly += meeting.rays(slot).count_ones();
@@ -264,7 +261,8 @@ mod tests {
 
     #[test]
     fn the_quick_test_meets_what_the_exact_one_meets() {
-        check::<f32x16>();
-        check::<f64x8>();
+        check::<f32x16, f32x8, WIDTH>();
+        check::<f32x16, f32x16, WIDE>();
+        check::<f64x8, f64x8, WIDTH>();
     }
 }

@@ -4,7 +4,7 @@ use super::best::Best;
 use super::chunk::{Chunk, RAYS, Set};
 use super::due::{self, Due};
 use super::{leaf, node};
-use crate::bvh::{Child, Node, Tree, WIDTH};
+use crate::bvh::{Child, Node, Tree, WIDE, WIDTH};
 use crate::lanes::words::prefetch_either;
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Counters;
@@ -43,7 +43,7 @@ impl<S: Real> Pile<S> {
         self.entries.resize(self.entries.len().max(bound + WIDTH), none);
     }
 
-    /// The places above the top, at least [`WIDTH`].
+    /// The places above the top, at least [`WIDE`].
     #[inline(always)]
     fn room(&mut self) -> &mut [Waiting<S>] {
         &mut self.entries[self.len..]
@@ -104,16 +104,16 @@ impl<'a, S: Real> Walk<'a, S> {
             self.object::<V, ANY, COUNT>(object, 0, chunk, all, octant);
             return;
         }
-        let top = &world.top;
-        let fetch = |child: Child| {
-            let (at, is_leaf) = (child.index as usize, child.is_leaf());
-            let inst = world.top_leaves[if is_leaf { at } else { 0 }] as usize;
-            prefetch_either(&top.nodes, &world.instances, is_leaf, if is_leaf { inst } else { at });
-        };
-        self.tree::<V, ANY, COUNT>(top, chunk, all, octant, &fetch, |walk, leaf, rays| {
+        let leaf = |walk: &mut Self, leaf: Child, rays: Set| {
             let inst = world.top_leaves[leaf.index as usize];
             walk.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, rays);
-        });
+        };
+        let at = |child: Child| {
+            let (at, is_leaf) = (child.index as usize, child.is_leaf());
+            let inst = world.top_leaves[if is_leaf { at } else { 0 }] as usize;
+            if is_leaf { inst } else { at }
+        };
+        self.tree::<V, _, ANY, COUNT>(&world.top, chunk, (all, octant), (&world.instances, at), leaf);
         for &inst in &world.unbounded_instances {
             self.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, all);
         }
@@ -168,30 +168,53 @@ impl<'a, S: Real> Walk<'a, S> {
             });
         }
         self.at_once = rays.count_ones() < due::LEAST;
-        let nodes = &object.tree.nodes[..];
-        let fetch = |child: Child| prefetch_either(nodes, &object.triangles, child.is_leaf(), child.index as usize);
-        self.tree::<V, ANY, COUNT>(&object.tree, chunk, rays, octant, &fetch, |walk, child, rays| {
-            leaf::block::<V, ANY, COUNT>(object, inst, chunk, walk, child, rays);
-        });
+        let at = |child: Child| child.index as usize;
+        self.tree::<V, _, ANY, COUNT>(
+            &object.tree,
+            chunk,
+            (rays, octant),
+            (&object.triangles, at),
+            |walk, child, rays| {
+                leaf::block::<V, ANY, COUNT>(object, inst, chunk, walk, child, rays);
+            },
+        );
         if ANY && !self.due.is_empty() {
             due::test::<S, COUNT>(object, inst, chunk, self);
         }
     }
 
-    /// Traverses `tree` with some rays of one octant. `fetch` asks the memory for a child.
+    /// Traverses `tree` with some rays of one octant. `leaves`: what leaves refer to, and at which place of it or of the nodes what a
+    /// child refers to lies, so that the memory is asked for it in time.
     #[inline(always)]
-    fn tree<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+    fn tree<V: Lanes<Scalar = S>, T, const ANY: bool, const COUNT: bool>(
         &mut self,
         tree: &Tree<S>,
         chunk: &Chunk<S>,
-        rays: Set,
-        octant: usize,
-        fetch: &impl Fn(Child),
+        of: (Set, usize),
+        leaves: (&[T], impl Fn(Child) -> usize),
+        leaf: impl FnMut(&mut Self, Child, Set),
+    ) {
+        if const { S::Children::N == WIDE } {
+            self.nodes::<V, S::Children, T, WIDE, ANY, COUNT>(&tree.wide, chunk, of, leaves, leaf);
+        } else {
+            self.nodes::<V, S::Octo, T, WIDTH, ANY, COUNT>(&tree.nodes, chunk, of, leaves, leaf);
+        }
+    }
+
+    /// See [`Walk::tree`]; `E`: vectors of the `W` children of `nodes`.
+    #[inline(always)]
+    fn nodes<V: Lanes<Scalar = S>, E: Lanes<Scalar = S>, T, const W: usize, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        nodes: &[Node<S, W>],
+        chunk: &Chunk<S>,
+        (rays, octant): (Set, usize),
+        (leaves, at): (&[T], impl Fn(Child) -> usize),
         mut leaf: impl FnMut(&mut Self, Child, Set),
     ) {
-        if tree.nodes.is_empty() {
+        if nodes.is_empty() {
             return;
         }
+        let fetch = |child: Child| prefetch_either(nodes, leaves, child.is_leaf(), at(child));
         let base = self.waiting.len;
         let (mut child, mut rays) = (Child::ROOT, rays);
         loop {
@@ -199,16 +222,17 @@ impl<'a, S: Real> Walk<'a, S> {
                 rays &= !self.best.done;
             }
             if rays != 0 && !child.is_leaf() {
-                let node = &tree.nodes[child.index as usize];
+                let node = &nodes[child.index as usize];
                 if COUNT {
                     self.counters.nodes += 1;
-                    self.counters.box_lanes += WIDTH as u64 * u64::from(rays.count_ones());
+                    self.counters.wide_nodes += u64::from(W == WIDE);
+                    self.counters.box_lanes += W as u64 * u64::from(rays.count_ones());
                     self.counters.node_lanes_active += u64::from(rays.count_ones());
                     self.counters.node_lanes_total += RAYS as u64;
                 }
-                let met = node::meet::<V, ANY>(node, chunk, &self.best.t, rays, octant);
+                let met = node::meet::<V, E, W, ANY>(node, chunk, &self.best.t, rays, octant);
                 if met.children != 0 {
-                    (child, rays) = self.choose::<ANY>(node, &met, fetch);
+                    (child, rays) = self.choose::<E, W, ANY>(node, &met, &fetch);
                     continue;
                 }
             } else if rays != 0 {
@@ -225,36 +249,41 @@ impl<'a, S: Real> Walk<'a, S> {
     /// The child to visit next with its rays; the others that are met go to the stack, nearest on top. Every child's
     /// place comes from counting those that are farther: sorting them would mean a surprise per comparison.
     #[inline(always)]
-    fn choose<const ANY: bool>(&mut self, node: &Node<S>, met: &node::Met<S>, fetch: &impl Fn(Child)) -> (Child, Set) {
+    fn choose<E: Lanes<Scalar = S>, const W: usize, const ANY: bool>(
+        &mut self,
+        node: &Node<S, W>,
+        met: &node::Met<S, W>,
+        fetch: &impl Fn(Child),
+    ) -> (Child, Set) {
         let last = met.children.count_ones() as usize - 1;
-        let places = &mut self.waiting.room()[..WIDTH];
+        let places = &mut self.waiting.room()[..W];
         let mut rest = met.children;
         if ANY {
             // In the node's own order, large children first.
             for place in places.iter_mut().take(last) {
-                let slot = rest.ilog2() as usize & (WIDTH - 1);
+                let slot = rest.ilog2() as usize & (W - 1);
                 rest &= !(1 << slot);
                 let child = node.child(slot);
                 fetch(child);
                 *place = Waiting { rays: met.rays(slot), near: S::ZERO, bound: false, child };
             }
             self.waiting.len += last;
-            let slot = rest.trailing_zeros() as usize & (WIDTH - 1);
+            let slot = rest.trailing_zeros() as usize & (W - 1);
             fetch(node.child(slot));
             return (node.child(slot), met.rays(slot));
         }
         // No NaNs, so that no two children get one place.
-        let near = S::Octo::load(&met.near).fast_max(S::Octo::splat(S::LOWEST));
+        let near = E::load(&met.near).fast_max(E::splat(S::LOWEST));
         let mut next = 0;
         while rest != 0 {
-            let slot = rest.trailing_zeros() as usize & (WIDTH - 1);
+            let slot = rest.trailing_zeros() as usize & (W - 1);
             rest &= rest - 1;
             let child = node.child(slot);
             fetch(child);
             let before = (1 << slot) - 1;
-            let own = S::Octo::splat(met.near[slot]).fast_max(S::Octo::splat(S::LOWEST));
+            let own = E::splat(met.near[slot]).fast_max(E::splat(S::LOWEST));
             let farther = own.cmp_lt(near).bits() & !before | own.cmp_le(near).bits() & before;
-            let place = (farther & met.children).count_ones() as usize & (WIDTH - 1);
+            let place = (farther & met.children).count_ones() as usize & (W - 1);
             next = if place == last { slot } else { next };
             places[place] = Waiting { rays: met.rays(slot), near: met.near[slot], bound: met.bound, child };
         }

@@ -262,8 +262,8 @@ impl<'a> Job<'a> {
     }
 
     fn make_levels(&mut self) {
-        let below = self.world.objects.iter().map(|object| object.tree.depth).max().unwrap_or(0);
-        let depth = (self.world.top.depth + below) as usize + 1;
+        let below = self.world.objects.iter().map(|object| node::levels(&object.tree)).max().unwrap_or(0);
+        let depth = node::levels(&self.world.top) + below + 1;
         if self.memory.levels.len() < depth {
             self.memory.levels.resize(depth, node::Level::default());
         }

@@ -1,4 +1,4 @@
-//! One node against a tile: eight boxes against both edges of the tile's rectangle at once, then one box against
+//! One node against a tile: its boxes against both edges of the tile's rectangle at once, then one box against
 //! sixteen groups at a time.
 //!
 //! For a plane through the apex with normal n, a box with centre c and half size h has n.c + |n|.h as largest
@@ -10,12 +10,26 @@
 use super::frame::Frame;
 use super::groups::Groups;
 use super::{SET, V};
-use crate::bvh::{Node, WIDTH};
-use crate::lanes::words::{halves, signs, twice, upper_halves, without_key};
-use crate::lanes::{LaneMask, Lanes, each, f32x8, map3};
+use crate::bvh::{Node, Nodes, Tree};
+use crate::lanes::words::{signs, upper_halves, without_key};
+use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 
-/// Half a vector: the eight children of a node.
-type Half = f32x8;
+/// A vector of a node's children.
+type Children = <f32 as Real>::Children;
+
+/// Children per node.
+pub const WIDTH: usize = Children::N;
+
+/// Levels of a tree.
+pub fn levels(tree: &Tree<f32>) -> usize {
+    Nodes::<f32, WIDTH>::levels(tree) as usize
+}
+
+/// A child's place in its node.
+#[inline(always)]
+pub fn slot(at: u32) -> usize {
+    at as usize & (WIDTH - 1)
+}
 
 /// Rounding errors of a box test, in half ulps of the scene's size ([`Frame::extent`]) times the plane's size; and how
 /// far a hit that the triangle test may accept can lie outside.
@@ -24,12 +38,12 @@ pub const MARGIN: f32 = 48.0;
 /// What node tests need of a tile.
 #[derive(Clone, Copy, Debug)]
 pub struct Planes {
-    /// Per axis (s, t): half the plane normals' components, left edge in the low half, right edge in the high half.
-    normal: [[V; 3]; 2],
+    /// Per axis (s, t), of the left and the right edge: half the plane normals' components.
+    normal: [[[f32; 3]; 2]; 2],
     /// Their absolute values.
-    size: [[V; 3]; 2],
-    /// Margin by axis.
-    margin: [V; 2],
+    size: [[[f32; 3]; 2]; 2],
+    /// Margin by axis and edge.
+    margin: [[f32; 2]; 2],
     /// Half the depth axis, its absolute value, its margin.
     depth: [f32; 3],
     depth_size: [f32; 3],
@@ -82,11 +96,10 @@ impl Planes {
     #[inline(always)]
     pub fn of(groups: &Groups, frame: &Frame, margin: f32) -> Self {
         let [u, v, a] = frame.axes;
-        let both = |lo: f32, hi: f32| twice_each(lo, hi);
         let mut planes = Self {
-            normal: [[V::splat(0.0); 3]; 2],
-            size: [[V::splat(0.0); 3]; 2],
-            margin: [V::splat(0.0); 2],
+            normal: [[[0.0; 3]; 2]; 2],
+            size: [[[0.0; 3]; 2]; 2],
+            margin: [[0.0; 2]; 2],
             depth: a.map(|x| 0.5 * x),
             depth_size: a.map(|x| (0.5 * x).abs()),
             depth_margin: 0.0,
@@ -96,11 +109,11 @@ impl Planes {
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
         for (axis, across) in [u, v].into_iter().enumerate() {
             let normal = groups.bounds[axis].map(|edge| each(|x| across[x] - edge * a[x]));
-            planes.normal[axis] = each(|x| both(0.5 * normal[0][x], 0.5 * normal[1][x]));
-            planes.size[axis] = map3(planes.normal[axis], V::abs);
+            planes.normal[axis] = normal.map(|n| n.map(|x| 0.5 * x));
+            planes.size[axis] = normal.map(|n| n.map(|x| (0.5 * x).abs()));
             // The tile's edges are rounded differences too: |edge| * |a| belongs to the plane's size.
             let [lo, hi] = normal.map(|n| margin * (sum(n) + sum(across) + groups.wide * sum(a)));
-            planes.margin[axis] = both(lo, hi) + V::splat(groups.slack * (1.0 + groups.wide) * 2.0);
+            planes.margin[axis] = [lo, hi].map(|m| m + groups.slack * (1.0 + groups.wide) * 2.0);
         }
         planes.depth_margin = margin * sum(a) + groups.slack * 2.0;
         planes
@@ -108,40 +121,48 @@ impl Planes {
 
     /// Tests the children of `node`; returns those that are met, and fills in `level` if any is.
     #[inline(always)]
-    pub fn open(&self, node: &Node<f32>, level: &mut Level) -> u32 {
-        let zero = Half::splat(0.0);
+    pub fn open(&self, node: &Node<f32, WIDTH>, level: &mut Level) -> u32 {
+        let splat = <Children as Lanes>::splat;
+        let zero = splat(0.0);
         let (mut sum, mut size) = ([zero; 3], [zero; 3]);
         for a in 0..3 {
-            let origin = Half::splat(self.apex[a]);
-            let lo = Half::new(node.bounds[a][0]) - origin;
-            let hi = Half::new(node.bounds[a][1]) - origin;
+            let origin = splat(self.apex[a]);
+            let [lo, hi] = &node.bounds[a];
+            let (lo, hi) = (Children::load(lo) - origin, Children::load(hi) - origin);
             (sum[a], size[a]) = (hi + lo, hi - lo);
         }
-        let (sums, sizes) = (map3(sum, twice), map3(size, twice));
-        let middle = |n: &[V; 3]| n[0].mul_add(sums[0], n[1].mul_add(sums[1], n[2] * sums[2]));
-        let radius = |n: &[V; 3], e: V| n[0].mul_add(sizes[0], n[1].mul_add(sizes[1], n[2].mul_add(sizes[2], e)));
-        let (ms, rs) = (middle(&self.normal[0]), radius(&self.size[0], self.margin[0]));
-        let (mt, rt) = (middle(&self.normal[1]), radius(&self.size[1], self.margin[1]));
-        let (left, right, below, above) = (rs + ms, rs - ms, rt + mt, rt - mt);
-        let d = map3(self.depth, Half::splat);
-        let e = map3(self.depth_size, Half::splat);
-        let mz = d[0].mul_add(sum[0], d[1].mul_add(sum[1], d[2] * sum[2]));
-        let margin = Half::splat(self.depth_margin);
-        let rz = e[0].mul_add(size[0], e[1].mul_add(size[1], e[2].mul_add(size[2], margin)));
+        let middle = |n: [f32; 3]| {
+            let n = map3(n, splat);
+            n[0].mul_add(sum[0], n[1].mul_add(sum[1], n[2] * sum[2]))
+        };
+        let radius = |n: [f32; 3], e: f32| {
+            let n = map3(n, splat);
+            n[0].mul_add(size[0], n[1].mul_add(size[1], n[2].mul_add(size[2], splat(e))))
+        };
+        // Of the planes of either family along an axis, as they are at one of the tile's edges.
+        let planes = |axis: usize, edge: usize| {
+            let m = middle(self.normal[axis][edge]);
+            let r = radius(self.size[axis][edge], self.margin[axis][edge]);
+            (r + m, r - m)
+        };
+        let ((left_low, right_low), (left_high, right_high)) = (planes(0, 0), planes(0, 1));
+        let ((below_low, above_low), (below_high, above_high)) = (planes(1, 0), planes(1, 1));
+        let (mz, rz) = (middle(self.depth), radius(self.depth_size, self.depth_margin));
         // Left of the tile's left edge or right of its right edge, all of the box.
-        let outside = signs(left.fast_min(below)) & 0xff | signs(right.fast_min(above)) >> 8;
-        let in_front = Half::splat(self.front).cmp_le(mz + rz).bits();
-        let met = !outside & in_front & ((1u32 << node.used.min(8)) - 1);
+        let least = left_low.fast_min(below_low).fast_min(right_high.fast_min(above_high));
+        let outside = least.cmp_lt(zero) | (mz + rz).cmp_lt(splat(self.front));
+        let met = !outside.bits() & ((1u32 << node.used.min(WIDTH as u32)) - 1);
         if met == 0 {
             return 0;
         }
-        for (family, value) in [left, right, below, above].into_iter().enumerate() {
-            let [low, high] = halves(value);
+        let families =
+            [(left_low, left_high), (right_low, right_high), (below_low, below_high), (above_low, above_high)];
+        for (family, (low, high)) in families.into_iter().enumerate() {
             low.store(&mut level.low[family]);
             (high - low).store(&mut level.step[family]);
         }
         let near = mz - rz;
-        level.near = near.to_array();
+        near.store(&mut level.near);
         level.keys = upper_halves(near.fast_max(zero), met);
         met
     }
@@ -172,8 +193,4 @@ impl Level {
     pub fn remove(&mut self, child: usize) {
         self.keys = without_key(&self.keys, child);
     }
-}
-
-fn twice_each(lo: f32, hi: f32) -> V {
-    V::new(std::array::from_fn(|i| if i < 8 { lo } else { hi }))
 }

@@ -4,13 +4,13 @@
 use super::batch::BATCH;
 use super::exact::Exact;
 use super::fine;
-use super::node::{self, Level, Planes, key};
+use super::node::{self, Level, Planes, WIDTH, key, slot};
 use super::pairs::flush;
 use super::place::{self, Place};
 use super::shapes;
 use super::slab::Space;
 use super::{GROUPS, HALF_ULP, Memory, SET, V};
-use crate::bvh::{Child, Node, Tree, WIDTH};
+use crate::bvh::{Child, Node, Nodes, Tree, WIDE};
 use crate::lanes::Lanes;
 use crate::lanes::words::{least_key, prefetch};
 use crate::ray::Counters;
@@ -94,8 +94,8 @@ fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool
     groups: u64,
     counters: &mut Counters,
 ) {
-    let tree = view.tree;
-    let Some(root) = tree.nodes.first() else { return };
+    let nodes: &[Node<f32, WIDTH>] = view.tree.of_width();
+    let Some(root) = nodes.first() else { return };
     let mut limit = limit(memory);
     let mut depth = view.first;
     if !open(view, leaves, root, 0, groups, &mut memory.levels[depth], counters) {
@@ -113,7 +113,7 @@ fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool
         }
         level.remove(slot);
         let mut met = level.groups_at::<N>(slot, &memory.groups);
-        let node = &tree.nodes[level.node as usize];
+        let node = &nodes[level.node as usize];
         let child = node.child(slot);
         if met != 0 && (memory.slabs.wanted::<ANY>(met) || leaves.is_dear(child, met, memory.slabs.pay())) {
             met = memory.slabs.test(&memory.groups, exact.bundle, &view.space, &node.child_bounds(slot), met);
@@ -125,7 +125,7 @@ fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool
             leaves.visit(memory, exact, child, met, counters);
             limit = self::limit(memory);
         } else {
-            let node = &tree.nodes[child.index as usize];
+            let node = &nodes[child.index as usize];
             let below = &mut memory.levels[depth + 1];
             if open(view, leaves, node, child.index, met, below, counters) {
                 depth += 1;
@@ -151,7 +151,7 @@ fn is_of_shapes(leaf: Child) -> bool {
 fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     view: &View,
     leaves: &impl Leaves<N, ANY, EXACT, COUNT>,
-    node: &Node<f32>,
+    node: &Node<f32, WIDTH>,
     index: u32,
     groups: u64,
     level: &mut Level,
@@ -161,6 +161,7 @@ fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
         counters.nodes += 1;
         counters.boxes += u64::from(node.used);
         counters.box_lanes += WIDTH as u64;
+        counters.wide_nodes += u64::from(WIDTH == WIDE);
         counters.node_lanes_active += u64::from(groups.count_ones()) * V::N as u64;
         counters.node_lanes_total += (N * SET * V::N) as u64;
     }
@@ -171,12 +172,12 @@ fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     (level.node, level.groups) = (index, groups);
     // Most of them are visited, one after the other: their way from memory starts now.
     while met != 0 {
-        let child = node.child(met.trailing_zeros() as usize & 7);
+        let child = node.child(slot(met.trailing_zeros()));
         met &= met - 1;
         if child.is_leaf() {
             leaves.fetch(child);
         } else {
-            prefetch(&view.tree.nodes, child.index as usize);
+            prefetch(Nodes::<f32, WIDTH>::of_width(view.tree), child.index as usize);
         }
     }
     true
@@ -251,7 +252,7 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
         let place = Place::new(world, inst, &state.frame);
         let planes = Planes::of(state, &place.frame, node::MARGIN * HALF_ULP * place.frame.extent);
         let space = place.space(world, state.slack / state.frame.scale);
-        let view = View { tree: &place.object.tree, planes, space, first: world.top.depth as usize };
+        let view = View { tree: &place.object.tree, planes, space, first: node::levels(&world.top) };
         let leaves = Blocks { object: place.object, place: Some(&place) };
         memory.slabs.enter();
         descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &leaves, groups, counters);
