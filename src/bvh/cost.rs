@@ -9,7 +9,7 @@
 pub const PRIMITIVE: f32 = 0.25;
 
 /// Cost of a node or a leaf that is never met; also the share of rays from which on a box counts as met by many.
-const PLACE: f32 = 5e-4;
+const PLACE: f32 = 1e-3;
 
 /// Costs in a scene whose box has half the surface area `root`; areas of boxes are halved, too.
 #[derive(Clone, Copy, Debug)]

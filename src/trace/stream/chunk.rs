@@ -50,7 +50,7 @@ pub struct Chunk<S> {
     pub flat: bool,
     /// Whether some `shift` is too large to compute with.
     pub steep: bool,
-    /// Sum of the directions (closest-hit, of at least [`DENSE`] rays).
+    /// Sum of the directions (closest-hit, of at least [`DENSE`] rays with `bounds`).
     pub mean: [S; 3],
     /// Number of rays.
     pub len: usize,
@@ -120,12 +120,14 @@ impl<S: Real> Chunk<S> {
             self.put(at, &Packet::new(org, dir, V::load(&self.t_min[at..])));
         }
         self.bounds = Some(Bounds::of::<V>(self, t));
-        self.finish::<V, ANY>(Set::MAX);
+        if !ANY && self.len >= DENSE as usize {
+            self.mean = self.sum_of_directions::<V>();
+        }
     }
 
     /// The rays of `from` that meet an instance's box before `t`, in its space and at the same places. Returns which.
     #[inline(always)]
-    pub fn enter<V: Lanes<Scalar = S>, const ANY: bool>(
+    pub fn enter<V: Lanes<Scalar = S>>(
         &mut self,
         from: &Self,
         instance: &Instance<S>,
@@ -145,7 +147,6 @@ impl<S: Real> Chunk<S> {
             for at in (0..self.len).step_by(V::N) {
                 inside |= self.enter_vector::<V>(from, instance, t, at, (rays >> at) as u32 & V::ALL);
             }
-            self.finish::<V, ANY>(inside);
         }
         inside
     }
@@ -185,14 +186,6 @@ impl<S: Real> Chunk<S> {
         store3(packet.dir, &mut self.dir, at);
         packet.t_min.store(&mut self.t_min[at..]);
         self.put(at, packet);
-    }
-
-    /// Sums up what was taken in, if the order of boxes is to be told for so many `rays` at once.
-    #[inline(always)]
-    pub fn finish<V: Lanes<Scalar = S>, const ANY: bool>(&mut self, rays: Set) {
-        if !ANY && rays.count_ones() >= DENSE {
-            self.mean = self.sum_of_directions::<V>();
-        }
     }
 
     /// About that: entries after the last ray count too, as far as the vectors go.

@@ -59,7 +59,6 @@ impl<S: Real> Visitors<S> {
     ) {
         let Self { chunk, best, waiting, closer, rays } = self;
         chunk.len = vectors * V::N;
-        chunk.finish::<V, ANY>(*rays);
         Walk::new(best, (waiting, closer), stack, counters).octants::<V, ANY, COUNT>(object, inst, chunk, *rays);
     }
 

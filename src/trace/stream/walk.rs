@@ -134,7 +134,7 @@ impl<'a, S: Real> Walk<'a, S> {
             self.object::<V, ANY, COUNT>(object, inst, chunk, rays, octant);
             return;
         }
-        let inside = local.enter::<V, ANY>(chunk, instance, &self.best.t, rays);
+        let inside = local.enter::<V>(chunk, instance, &self.best.t, rays);
         self.octants::<V, ANY, COUNT>(object, inst, local, inside);
     }
 
