@@ -130,30 +130,35 @@ pub fn build_by_cost<S: Real>(
         return (Tree::empty(), Vec::new());
     }
     let plan = Plan::new(&binary, classes, each, settings.leaf);
-    let (mut leaves, mut blocks, mut numbers) = (Vec::new(), [0; 256], vec![None; binary.nodes.len()]);
+    let (mut sources, mut made) = (Vec::new(), Vec::new());
+    let (mut blocks, mut numbers) = ([0; 256], vec![None; binary.nodes.len()]);
     let (nodes, depth) = emit(&binary, &plan, |source| {
-        let (class, prims) = (plan.class(source), plan.prims(&binary, source));
-        let block = blocks[usize::from(class)];
+        let (count, class) = (plan.count(source) as u8, plan.class(source));
+        let index = blocks[usize::from(class)];
         blocks[usize::from(class)] += 1;
-        numbers[source] = Some(leaves.len() as u32);
-        leaves.push(Leaf { class, block, prims });
-        leaves[leaves.len() - 1].child()
+        numbers[source] = Some(made.len() as u32);
+        sources.push(source);
+        made.push(Child { index, count, class });
+        made[made.len() - 1]
     });
-    let mut tree = Tree { nodes, wide: Vec::new(), depth, wide_depth: 0, bounds: binary.nodes[0].bounds };
-    if S::Children::N >= WIDE {
-        // Leaves of the one tree are what the other is over.
-        let above = binary.above(&numbers);
-        let plan = Plan::new(&above, &vec![0; leaves.len()], &[], 1);
-        (tree.wide, tree.wide_depth) = emit(&above, &plan, |source| leaves[above.prims(source)[0] as usize].child());
-    }
-    (tree, leaves)
+    let leaf = |(&source, child): (&usize, &Child)| Leaf {
+        class: child.class,
+        block: child.index,
+        prims: plan.prims(&binary, source),
+    };
+    let (leaves, (wide, wide_depth)) = rayon::join(
+        || sources.iter().zip(&made).map(leaf).collect(),
+        || if S::Children::N >= WIDE { widen(&binary, &numbers, &made) } else { (Vec::new(), 0) },
+    );
+    (Tree { nodes, wide, depth, wide_depth, bounds: binary.nodes[0].bounds }, leaves)
 }
 
-impl Leaf {
-    /// A reference to it.
-    fn child(&self) -> Child {
-        Child { index: self.block, count: self.prims.len() as u8, class: self.class }
-    }
+/// The wide nodes over leaves that are `made` and the depth: leaves of the one tree are what the other is over. `numbers`: the leaves
+/// that binary nodes became.
+fn widen<S: Real>(binary: &Binary<S>, numbers: &[Option<u32>], made: &[Child]) -> (Vec<Node<S, WIDE>>, u32) {
+    let above = binary.above(numbers);
+    let plan = Plan::new(&above, &vec![0; made.len()], &[], 1);
+    emit(&above, &plan, |source| made[above.prims(source)[0] as usize])
 }
 
 /// Emits the nodes that are planned depth-first, with what `leaf` makes of the binary nodes that become leaves, and returns them and

@@ -83,24 +83,29 @@ impl<const W: usize> Plan<W> {
     }
 
     fn inner(&mut self, i: usize, area: f32, model: Cost, left: &[f32; W], right: &[f32; W]) -> [f32; W] {
-        // forests[k]: best split into k + 1 trees, at least one on either side.
-        let mut forests = [(f32::INFINITY, 0u8); W];
-        for total in 2..=W {
-            for on_left in 1..total {
-                let cost = left[on_left - 1] + right[total - on_left - 1];
-                if cost < forests[total - 1].0 {
-                    forests[total - 1] = (cost, on_left as u8);
-                }
+        // Best split into k + 1 trees, at least one on either side, and how many are on the left then. Whole rows at once: what
+        // there is right of so many trees on the left, with nothing where there are too few.
+        let (mut forests, mut on_lefts) = ([f32::INFINITY; W], [0u32; W]);
+        let mut right_of = [[f32::INFINITY; W]; 2];
+        right_of[1] = *right;
+        let right_of = right_of.as_flattened();
+        for on_left in 1..W {
+            let (cost_left, right) = (left[on_left - 1], &right_of[W - on_left..][..W]);
+            for k in 0..W {
+                let cost = cost_left + right[k];
+                let better = cost < forests[k];
+                forests[k] = if better { cost } else { forests[k] };
+                on_lefts[k] = if better { on_left as u32 } else { on_lefts[k] };
             }
         }
         let fits = self.counts[i] <= self.most && self.classes[i] != MIXED;
-        let (best_forest, on_left) = forests[W - 1];
+        let (best_forest, on_left) = (forests[W - 1], on_lefts[W - 1] as u8);
         let (as_node, as_leaf) = (model.node(area) + best_forest, self.leaf(i, area, model));
         let leaf = fits && as_leaf <= as_node;
         self.decisions[i][0] = if leaf { 0 } else { on_left };
         let mut costs = [if leaf { as_leaf } else { as_node }; W];
         for k in 1..W {
-            let (cost, on_left) = forests[k];
+            let (cost, on_left) = (forests[k], on_lefts[k] as u8);
             // Where areas vanish and everything costs the same, a wide node is flatter than a chain.
             if cost < costs[k - 1] || (cost == costs[k - 1] && !leaf) {
                 (costs[k], self.decisions[i][k]) = (cost, on_left);
@@ -114,6 +119,11 @@ impl<const W: usize> Plan<W> {
     /// Whether `node`, as one tree, is a leaf.
     pub fn is_leaf<S>(&self, tree: &Binary<S>, node: usize) -> bool {
         tree.nodes[node].children().is_none() || self.decisions[node][0] == 0
+    }
+
+    /// Primitives below `node`.
+    pub fn count(&self, node: usize) -> u32 {
+        self.counts[node]
     }
 
     /// Class of a leaf.
