@@ -1,4 +1,4 @@
-//! lanecast traces rays in SIMD lanes: coherent tiles of rays, packets of 4, 8 or 16 lanes, a flattened 8-wide BVH
+//! lanecast traces rays in SIMD lanes: coherent tiles of rays, packets of 4, 8 or 16 lanes, a flattened 8- and 16-wide BVH
 //! over structure-of-arrays primitives, HDR output, and a measuring bench that checks every hit before it is timed.
 //!
 //! # The house

@@ -1,4 +1,4 @@
-//! Bounding volume hierarchies: build, refinement (obvhs), collapse to eight children, flat layout, validation, cost.
+//! Bounding volume hierarchies: build, refinement (obvhs), collapse to eight and to sixteen children, flat layout, validation, cost.
 //!
 //! The tree knows boxes and leaf classes, not shapes: the caller brings one box and one class number per primitive
 //! and stores each leaf's primitives (at most eight, of one class) as one block of that class.

@@ -154,7 +154,7 @@ pub fn work<S: Engines>(
         prims_per_ray: total.prims as f64 / rays,
         bytes_per_ray: bytes(&total) / rays,
         together: (packets_of_many > 0).then(|| 1.0 - depths.len() as f64 / packets_of_many as f64),
-        boxes_passed: total.boxes as f64 / (8 * total.nodes).max(1) as f64,
+        boxes_passed: total.boxes as f64 / (8 * (total.nodes + total.wide_nodes)).max(1) as f64,
         mrays_per_s: if seconds > 0.0 { total.rays as f64 / seconds / 1e6 } else { 0.0 },
         limit: if is_of_triangles(world) { Limit::of(costs, &total, seconds) } else { None },
         shares,

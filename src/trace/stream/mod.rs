@@ -1,12 +1,12 @@
-//! Streams: many rays without a common point through the 8-wide tree together, for what packets are bad at.
+//! Streams: many rays without a common point through the tree of widest nodes together, for what packets are bad at.
 //!
 //! The rays of a batch are sorted by octant and cut into chunks of up to 128. A chunk goes down the tree as one, with
-//! a bit per ray for every box on the stack. At a node few rays are tested one by one against eight boxes, many as
-//! vectors of rays against one box after the other; in both cases a loop of known length replaces the branches of one
-//! ray's own traversal, which are what incoherent rays spend their time on. At a leaf likewise; where few any-hit rays
-//! meet one, they wait for those of other leaves ([`due`]). Vectors of rays that are coherent after all go to the packet
-//! kernel; among shapes, blocks of such vectors go down the tree together. The kernels and so the hits are those of the
-//! other generic engines, bit by bit.
+//! a bit per ray for every box on the stack. At a node rays are tested one by one against eight or sixteen boxes, or,
+//! where many rays are left and few boxes, as vectors of rays against one box after the other; in both cases a loop of
+//! known length replaces the branches of one ray's own traversal, which are what incoherent rays spend their time on. At a
+//! leaf likewise; where few any-hit rays meet one, they wait for those of other leaves ([`due`]). Vectors of rays that are
+//! coherent after all go to the packet kernel; among shapes, blocks of such vectors go down the tree together. The kernels
+//! and so the hits are those of the other generic engines, bit by bit.
 //!
 //! Sources: Wald, Gribble, Boulos, Kensler, "SIMD Ray Stream Tracing", 2007; Tsakok, "Faster Incoherent Rays: Multi-BVH
 //! Ray Stream Tracing", 2009; Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray tracing kernels for modern CPU

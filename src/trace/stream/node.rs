@@ -9,8 +9,8 @@ use crate::ray::slab::{Interval, PAD, pad};
 /// From this many rays on they are tested as vectors, if that is less to do.
 pub const DENSE: u32 = 32;
 
-/// What one ray's test of a node takes, in halves of what a vector's test of one box does.
-const ONE: u32 = 1;
+/// How many rays' tests of a node take as long as a vector's test of one box.
+const BOX: u32 = 2;
 
 /// Which rays meet which child of a node that has `W`.
 pub struct Met<S, const W: usize> {
@@ -57,7 +57,7 @@ pub fn meet<V: Lanes, E: Lanes<Scalar = V::Scalar>, const W: usize, const ANY: b
         && let Some(bounds) = &chunk.bounds
     {
         let children = bounds.children::<E, W>(&planes(node, octant), octant) & ((1 << node.used) - 1);
-        if children.count_ones() * chunk.len.div_ceil(V::N) as u32 * 2 <= many * ONE {
+        if BOX * children.count_ones() * chunk.len.div_ceil(V::N) as u32 <= many {
             return dense::<V, W, ANY>(node, chunk, t, rays, (octant, children));
         }
     }

@@ -1,7 +1,7 @@
 //! Tiles: up to 1024 rays with a common origin, a common end (any-hit), or a common point behind them ([`mirror`]),
-//! through the 8-wide tree together.
+//! through the tree of widest nodes together.
 //!
-//! The speed comes from doing per tile what packets do per ray: one node test is eight boxes against the whole tile,
+//! The speed comes from doing per tile what packets do per ray: one node test is all its boxes against the whole tile,
 //! triangles are set up once per tile, and a ray's share of a triangle test is four linear functions of its two
 //! coordinates. `tile` answers with that arithmetic ([`own`]; [`batch`] states its accuracy). In `tile-exact` the common
 //! formula decides where rounding could matter, so its hits are those of the other engines, bit by bit ([`exact`]).
