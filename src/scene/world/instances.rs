@@ -118,7 +118,7 @@ mod tests {
         let description = load("builtin:forest", &LoadOptions::default()).unwrap();
         let mut world = World::<f32>::compile(&description, Preset::Fast).unwrap();
         let placed = |object: &usize| world.instances.iter().filter(|i| i.object as usize == *object).count();
-        let large = |object: &usize| world.objects[*object].tree.nodes.len() > 16;
+        let large = |object: &usize| world.objects[*object].tree.nodes.len() > 8;
         let most = (0..world.objects.len()).filter(large).max_by_key(placed).unwrap();
         world.objects.swap_remove(most)
     }
