@@ -1,4 +1,4 @@
-//! The flat node: eight children for all engines, sixteen for streams.
+//! The flat node: eight children for all engines, sixteen for streams and tiles where registers hold as many.
 
 use crate::lanes::{Real, each};
 use crate::math::Aabb;
@@ -12,7 +12,7 @@ pub const WIDE: usize = 16;
 /// Most primitives in a leaf.
 pub const LEAF_PRIMS: usize = 8;
 
-/// The boxes of `W` children as a structure of arrays. f32, eight children: 256 bytes, four cache lines (of sixteen twice as much):
+/// The boxes of `W` children as a structure of arrays. f32, eight children: 256 bytes, four cache lines (sixteen: twice as many):
 ///
 /// | bytes | content |
 /// |---|---|
