@@ -19,6 +19,10 @@ pub const START_ROUNDINGS: f64 = 8.0;
 /// not watertight and take a ray's own surface at t = 0 for a hit differ in 2 to 3 rays of 10^5 on voxels and on hair.
 pub const MAX_DIFFERING: f64 = 1e-4;
 
+/// Largest share of rays that may differ in a row that gets a figure although more than [`MAX_DIFFERING`] do, because the oracle
+/// explains both answers to each of them: in instances starts are rounded on the way in, and near hits at a flat angle move far.
+pub const MAX_EXPLAINED: f64 = 1e-3;
+
 /// How a peer's answers compare with ours.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Agreement {
@@ -26,18 +30,28 @@ pub struct Agreement {
     pub rays: u64,
     /// Same t, another primitive: shared edges, coincident surfaces.
     pub ties: u64,
-    /// Another t, or a hit against a miss.
-    pub differences: u64,
     /// The first difference in words.
     pub first: Option<String>,
     /// Numbers of all rays counted above, ascending.
     pub unlike: Vec<u64>,
+    /// Of these, those with another t, or a hit against a miss.
+    pub differing: Vec<u64>,
 }
 
 impl Agreement {
+    /// Rays with another t, or a hit against a miss.
+    pub fn differences(&self) -> u64 {
+        self.differing.len() as u64
+    }
+
     /// Whether a figure may be quoted.
     pub fn passes(&self) -> bool {
-        self.differences as f64 <= MAX_DIFFERING * self.rays as f64
+        self.differences() as f64 <= MAX_DIFFERING * self.rays as f64
+    }
+
+    /// Whether a figure may be quoted if `explained`: the oracle explains both answers to each ray that differs.
+    pub fn passes_if(&self, explained: impl FnOnce() -> bool) -> bool {
+        self.passes() || self.differences() as f64 <= MAX_EXPLAINED * self.rays as f64 && explained()
     }
 }
 
@@ -75,7 +89,8 @@ fn compare_within<S: Real>(ours: &Answers<S>, theirs: &Answers<S>, slack: impl F
     let rays = ours.ray_count();
     let missing = rays.max(theirs.ray_count()) - result.rays;
     result.unlike.extend(result.rays..result.rays + missing);
-    Agreement { rays: result.rays + missing, differences: result.differences + missing, ..result }
+    result.differing.extend(result.rays..result.rays + missing);
+    Agreement { rays: result.rays + missing, ..result }
 }
 
 impl Agreement {
@@ -99,8 +114,8 @@ impl Agreement {
 
     fn count(&mut self, same: bool, text: impl FnOnce() -> String) {
         if !same {
-            self.differences += 1;
             self.unlike.push(self.rays);
+            self.differing.push(self.rays);
             let number = self.rays;
             self.first.get_or_insert_with(|| format!("ray {number}: {}", text()));
         }
@@ -129,10 +144,10 @@ mod tests {
         let ours = hits(&[(1.0, 1), (1.0, 1), (1.0, 1), MISS, MISS, (1000.0, 1)]);
         let theirs = hits(&[(1.00005, 1), (1.0, 2), (1.001, 1), MISS, (1.0, 1), (1000.05, 1)]);
         let agreement = compare(&ours, &theirs);
-        assert_eq!((agreement.rays, agreement.ties, agreement.differences), (6, 1, 2));
+        assert_eq!((agreement.rays, agreement.ties, agreement.differences()), (6, 1, 2));
         assert!(agreement.first.as_ref().is_some_and(|text| text.contains("ray 2: t 1 prim 1")), "{agreement:?}");
         assert!(!agreement.passes());
-        assert_eq!(agreement.unlike, [1, 2, 4]);
+        assert_eq!((agreement.unlike, agreement.differing), (vec![1, 2, 4], vec![2, 4]));
     }
 
     #[test]
@@ -149,15 +164,23 @@ mod tests {
 
     #[test]
     fn one_ray_in_ten_thousand_may_differ() {
-        let at = |differences| Agreement { rays: 20_000, differences, ..Default::default() };
+        let at = |differing| Agreement { rays: 20_000, differing: (0..differing).collect(), ..Default::default() };
         assert!(at(0).passes() && at(2).passes() && !at(3).passes());
+    }
+
+    #[test]
+    fn one_in_a_thousand_may_differ_if_the_oracle_explains_it() {
+        let at = |differing| Agreement { rays: 20_000, differing: (0..differing).collect(), ..Default::default() };
+        assert!(at(3).passes_if(|| true) && at(20).passes_if(|| true));
+        assert!(!at(3).passes_if(|| false) && !at(21).passes_if(|| true));
+        assert!(at(2).passes_if(|| unreachable!("nobody asks the oracle for what passes anyway")));
     }
 
     #[test]
     fn flags_and_missing_answers_count() {
         let any = |flags: &[u8]| Answers::<f32>::Any(vec![flags.to_vec()]);
-        assert_eq!(compare(&any(&[0, 1, 1]), &any(&[0, 1, 0])).differences, 1);
-        assert_eq!(compare(&any(&[0, 1, 1]), &any(&[0])).differences, 2);
-        assert_eq!(compare(&any(&[0, 1, 1]), &hits(&[MISS])).differences, 3);
+        assert_eq!(compare(&any(&[0, 1, 1]), &any(&[0, 1, 0])).differences(), 1);
+        assert_eq!(compare(&any(&[0, 1, 1]), &any(&[0])).differences(), 2);
+        assert_eq!(compare(&any(&[0, 1, 1]), &hits(&[MISS])).differences(), 3);
     }
 }

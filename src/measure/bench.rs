@@ -176,7 +176,7 @@ impl<S: Engines> Subject<'_, S> {
             modes.min_by(|&a, &b| mid(&series[a]).total_cmp(&mid(&series[b])))
         };
         let row = |engine, scene, peer, agreement: &Agreement, outcome| {
-            let Agreement { ties, differences, .. } = *agreement;
+            let (ties, differences) = (agreement.ties, agreement.differences());
             let (class, query, precision) = (kind.name(), kind.query().name(), S::PRECISION);
             Row { scene, class, query, engine, precision, rays, ties, differences, peer, outcome }
         };
@@ -220,15 +220,24 @@ impl<S: Engines> Subject<'_, S> {
         }
     }
 
-    /// A peer's answers, if all but a handful are ours up to rounding.
+    /// A peer's answers, if all but a handful are ours up to rounding, or the oracle explains both where they are not.
     fn admit_peer(&self, peer: &dyn Peer<S>, batches: &[Rays<S>], scalar: &Answers<S>) -> Admission<S> {
         let mut answers = scalar.clone();
         self.workers.peer_pass(peer, batches, &mut answers);
         let agreement = compare_traced(batches, scalar, &answers);
+        let mut why = String::new();
+        let passes = agreement.passes_if(|| {
+            let both = [scalar, &answers];
+            let explained =
+                self.workers.install(|| truth::explain_both(self.oracle, batches, both, &agreement.differing));
+            why = explained.as_ref().err().cloned().unwrap_or_default();
+            explained.is_ok()
+        });
         match &agreement.first {
-            Some(first) if !agreement.passes() => {
-                let (count, rays) = (agreement.differences, agreement.rays);
-                Err(Box::new(Outcome::Wrong(format!("{count} of {rays} rays differ from scalar, {first}"))))
+            Some(first) if !passes => {
+                let (count, rays) = (agreement.differences(), agreement.rays);
+                let why = if why.is_empty() { why } else { format!("; {why}") };
+                Err(Box::new(Outcome::Wrong(format!("{count} of {rays} rays differ from scalar, {first}{why}"))))
             }
             _ => Ok((answers, agreement)),
         }

@@ -74,8 +74,9 @@ pub fn compare(a: &FileAnswers, b: &FileAnswers) -> Result<HitReport> {
         }
         _ => return Err(Error::Usage("one file answers closest-hit, the other any-hit queries".into())),
     };
-    let agreement::Agreement { rays, ties, differences, first, .. } = agreement::compare(a, b);
-    Ok(HitReport { query, rays, classes, ties, differences, first, judged: None, unlike })
+    let agreement = agreement::compare(a, b);
+    let (rays, ties, differences) = (agreement.rays, agreement.ties, agreement.differences());
+    Ok(HitReport { query, rays, classes, ties, differences, first: agreement.first, judged: None, unlike })
 }
 
 /// Counts by distance, and the numbers of all rays that are not the same to the bit.

@@ -99,6 +99,24 @@ pub fn admit<'o, S: Engines>(
     }
 }
 
+/// Whether the oracle explains what two tracers answered to each of the rays called `numbers`, on which they differ by more
+/// than they should: then neither is wrong, and what differs is the rounding of either.
+///
+/// # Errors
+/// The first answer of the two that it does not explain, in words.
+pub fn explain_both<S: Engines>(
+    oracle: &Oracle,
+    batches: &[Rays<S>],
+    answers: [&Answers<S>; 2],
+    numbers: &[u64],
+) -> Result<(), String> {
+    let judged = answers.map(|answers| judge_rays(oracle, OWN_MARGIN_FACTOR, batches, answers, numbers));
+    match judged.iter().find_map(|counts| counts.samples.first()) {
+        None => Ok(()),
+        Some(first) => Err(format!("the oracle rejects {first}")),
+    }
+}
+
 /// Judges the rays called `numbers` (counted through the batches, ascending), see [`judge`].
 pub fn judge_rays<S: Engines>(
     oracle: &Oracle,
@@ -208,5 +226,30 @@ mod tests {
         assert_eq!(count(&hits, 2).total(), 2, "every second ray");
         let none = Answers::new(Query::Any, &batches);
         assert_eq!(judge(&oracle, MARGIN_FACTOR, &batches, &none, 1).unexplained, 3);
+    }
+
+    /// As above: the third ray's answer is a rounding off in one list and wrong in the other.
+    #[test]
+    fn both_answers_must_be_explained() {
+        let mut scene = Description::new("floor");
+        let kind = ItemKind::Shape(Shape::HalfSpace);
+        scene.groups[0].items.push(Item { transform: glam::DAffine3::IDENTITY, material: None, kind });
+        let oracle = Oracle::new(&Assembly::new(&scene).unwrap());
+        let batches = crate::measure::testing::falling_rays::<f32>(&[2, 1]);
+        let answers = |third: f32| {
+            let mut hits = [Hits::new(2), Hits::new(1)];
+            for (b, i, t) in [(0, 0, 1.0), (0, 1, 2.0), (1, 0, third)] {
+                (hits[b].t[i], hits[b].prim[i], hits[b].inst[i]) = (t, 0, 0);
+            }
+            Answers::Closest(hits.to_vec())
+        };
+        let (right, rounded, wrong) = (answers(3.0), answers(3.0f32.next_up()), answers(3.001));
+        let explained = |pair, numbers: &[u64]| explain_both(&oracle, &batches, pair, numbers);
+        assert_eq!(explained([&right, &rounded], &[2]), Ok(()));
+        for pair in [[&right, &wrong], [&wrong, &right]] {
+            let why = explained(pair, &[0, 2]).unwrap_err();
+            assert!(why.starts_with("the oracle rejects ray 2: "), "{why}");
+            assert_eq!(explained(pair, &[0, 1]), Ok(()), "only the rays that are asked for");
+        }
     }
 }

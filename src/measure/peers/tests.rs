@@ -81,7 +81,7 @@ fn agree(scene: &Description, invitation: &Invitation, threads: usize) -> std::r
                     let mut theirs = Answers::new(query, &batches);
                     workers.peer_pass(&*peer, &batches, &mut theirs);
                     let agreement = compare(&ours, &theirs);
-                    assert_eq!((agreement.differences, agreement.ties), (0, 0), "{what} {query:?}: {agreement:?}");
+                    assert_eq!((agreement.differences(), agreement.ties), (0, 0), "{what} {query:?}: {agreement:?}");
                     same_weights(&ours, &theirs, &what);
                 }
             }
