@@ -52,6 +52,14 @@ impl<T: Pod> Column<T> {
     }
 }
 
+impl Column<f32> {
+    /// The lines, each a vector.
+    #[inline(always)]
+    pub fn vectors(&self) -> &[f32x16] {
+        &self.lines
+    }
+}
+
 impl<T: Pod> Deref for Column<T> {
     type Target = [T];
 

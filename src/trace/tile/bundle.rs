@@ -1,5 +1,7 @@
 //! What the rays of a block have in common: the point they start from, or (any-hit) the point they end in.
 
+use std::cell::Cell;
+
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::words::{greatest, prefetch};
 use crate::lanes::{Column, LaneMask, Lanes, Lanes3, each, map3};
@@ -38,6 +40,89 @@ pub enum Source<'a> {
     Batch(&'a Rays<f32>),
     /// They are made here, and their places counted from those of the ray in the middle.
     Pencil(&'a Pencil, [f64; 2]),
+}
+
+/// The rays of a group and their ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Segments {
+    /// Origins.
+    pub org: Lanes3<V>,
+    /// Directions.
+    pub dir: Lanes3<V>,
+    /// Parameters of their starts.
+    pub t_min: V,
+    /// Parameters of their ends.
+    pub t_max: V,
+}
+
+/// Rays in memory, by groups: as many of all eight columns, so that one look at a group's number does for all.
+#[derive(Clone, Copy, Debug)]
+pub struct Columns<'a> {
+    org: Lanes3<&'a [V]>,
+    dir: Lanes3<&'a [V]>,
+    t_min: &'a [V],
+    t_max: &'a [V],
+}
+
+impl<'a> Columns<'a> {
+    /// Of a batch.
+    #[inline(always)]
+    pub fn of(rays: &'a Rays<f32>) -> Self {
+        let count = rays.padded_len() / V::N;
+        let groups = |column: &'a Column<f32>| &column.vectors()[..count];
+        let ([x, y, z], [dx, dy, dz]) = (&rays.org, &rays.dir);
+        Self {
+            org: [groups(x), groups(y), groups(z)],
+            dir: [groups(dx), groups(dy), groups(dz)],
+            t_min: groups(&rays.t_min),
+            t_max: groups(&rays.t_max),
+        }
+    }
+
+    /// Group `i` of the batch.
+    #[inline(always)]
+    pub fn get(&self, i: usize) -> Segments {
+        let Self { org: [x, y, z], dir: [dx, dy, dz], t_min, t_max } = *self;
+        Segments { org: [x[i], y[i], z[i]], dir: [dx[i], dy[i], dz[i]], t_min: t_min[i], t_max: t_max[i] }
+    }
+
+    /// Asks the memory for group `i`.
+    #[inline(always)]
+    pub fn prefetch(&self, i: usize) {
+        let Self { org: [x, y, z], dir: [dx, dy, dz], t_min, t_max } = *self;
+        for column in [x, y, z, dx, dy, dz, t_min, t_max] {
+            prefetch(column, i);
+        }
+    }
+}
+
+/// The rays that come after those of a tile: the memory is asked for them while the tile is traced, a few groups at a time.
+#[derive(Debug)]
+pub struct Next<'a> {
+    columns: Columns<'a>,
+    /// The group that is asked for next.
+    group: Cell<usize>,
+    /// Those from here on are for later tiles to ask for.
+    end: usize,
+}
+
+impl<'a> Next<'a> {
+    /// A block of `rays` from ray `first` on.
+    #[inline(always)]
+    pub fn of(rays: &'a Rays<f32>, first: usize) -> Self {
+        let group = first / V::N;
+        Self { columns: Columns::of(rays), group: Cell::new(group), end: group + GROUPS }
+    }
+
+    /// Asks for `count` groups.
+    #[inline(always)]
+    pub fn ask(&self, count: usize) {
+        let group = self.group.get();
+        if group < self.end {
+            (group..group + count).for_each(|i| self.columns.prefetch(i));
+            self.group.set(group + count);
+        }
+    }
 }
 
 /// Rays `first..first + 16 * groups` and their common point.
@@ -85,28 +170,11 @@ pub fn groups<const N: usize>(rays: &Rays<f32>, first: usize) -> usize {
     (rays.padded_len() - first).min(N * SET * V::N) / V::N
 }
 
-/// Asks the memory for the group of rays that starts with ray `first`.
-#[inline(always)]
-pub fn prefetch_rays(rays: &Rays<f32>, first: usize) {
-    let [x, y, z] = &rays.org;
-    let [dx, dy, dz] = &rays.dir;
-    for array in [x, y, z, dx, dy, dz, &rays.t_min, &rays.t_max] {
-        prefetch(array, first);
-    }
-}
-
 /// Asks the memory for what is looked at first: the first groups, and the sample that the first block's frame is made of.
 pub fn prefetch_first(rays: &Rays<f32>) {
-    (0..AHEAD).for_each(|g| prefetch_rays(rays, g * V::N));
-    (0..GROUPS).for_each(|g| prefetch_sample(rays, 0, g));
-}
-
-/// Asks the memory for group `g` of the block that starts with ray `first`, if the block's frame is made of it.
-#[inline(always)]
-pub fn prefetch_sample(rays: &Rays<f32>, first: usize, g: usize) {
-    if g.is_multiple_of(SETS) {
-        prefetch_rays(rays, first + g * V::N);
-    }
+    let columns = Columns::of(rays);
+    (0..AHEAD).for_each(|g| columns.prefetch(g));
+    (0..SET).for_each(|k| columns.prefetch(SETS * k));
 }
 
 impl<'a> Bundle<'a> {
@@ -198,26 +266,20 @@ impl<'a> Bundle<'a> {
     /// The rays of a group and their ends.
     #[inline(always)]
     pub fn packet(&self, g: usize) -> (Packet<V>, V) {
-        let ([org, dir], [t_min, t_max]) = self.segments(g);
+        let Segments { org, dir, t_min, t_max } = self.segments(g);
         (Packet::new(org, dir, t_min), t_max)
     }
 
-    /// The same as they are: origins and directions, starts and ends.
+    /// The same as they are.
     #[inline(always)]
-    pub fn segments(&self, g: usize) -> ([Lanes3<V>; 2], [V; 2]) {
-        let at = self.first + g * V::N;
-        let lines = match self.source {
-            Source::Batch(rays) => [load3(&rays.org, at), load3(&rays.dir, at)],
-            Source::Pencil(pencil, _) => [map3(self.apex, V::splat), pencil.directions(at / V::N).map(V::new)],
-        };
-        (lines, self.ends(g))
-    }
-
-    /// Asks the memory for the rays of a group.
-    #[inline(always)]
-    pub fn prefetch(&self, g: usize) {
-        if let Source::Batch(rays) = self.source {
-            prefetch_rays(rays, self.first + g * V::N);
+    pub fn segments(&self, g: usize) -> Segments {
+        let i = self.first / V::N + g;
+        match self.source {
+            Source::Batch(rays) => Columns::of(rays).get(i),
+            Source::Pencil(pencil, _) => {
+                let (org, dir) = (map3(self.apex, V::splat), pencil.directions(i).map(V::new));
+                Segments { org, dir, t_min: V::constant(0.0), t_max: V::splat(f32::INFINITY) }
+            }
         }
     }
 
@@ -260,20 +322,11 @@ impl<'a> Bundle<'a> {
         }
     }
 
-    /// Where the segments of a group start, of rays in memory.
-    #[inline(always)]
-    pub fn starts(&self, g: usize) -> Lanes3<V> {
-        let Source::Batch(rays) = self.source else { return map3(self.apex, V::splat) };
-        let at = self.first + g * V::N;
-        let (org, dir) = (load3(&rays.org, at), load3(&rays.dir, at));
-        let t_min = V::load(&rays.t_min[at..]);
-        each(|a| t_min.mul_add(dir[a], org[a]))
-    }
-
     #[inline(always)]
     fn sort_lanes(&mut self, rays: &Rays<f32>) {
+        let columns = Columns::of(rays);
         for g in 0..self.len {
-            prefetch_rays(rays, self.first + (g + AHEAD) * V::N);
+            columns.prefetch(self.first / V::N + g + AHEAD);
             self.sort_group(rays, g);
         }
     }

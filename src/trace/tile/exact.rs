@@ -1,7 +1,7 @@
 //! Where the common formula has the word: doubtful pairs while a tile is traced, and the numbers of its final hits.
 
 use super::batch::Planes;
-use super::bundle::Bundle;
+use super::bundle::{Bundle, Next};
 use super::groups::{Groups, NO_SLOT, bounded};
 use super::{HALF_ULP, Mask, V, select};
 use crate::lanes::chosen::merge;
@@ -23,6 +23,8 @@ pub struct Exact<'a> {
     pub world: &'a World<f32>,
     /// The triangles, if the world is one object.
     pub object: &'a Object<f32>,
+    /// The rays that come next.
+    pub next: Next<'a>,
 }
 
 /// A group's final hits.

@@ -1,6 +1,6 @@
 //! The rays of a tile: up to 64 groups of 16 (4x4 pixels), each ray as (s, t), its depth as 1/z between two bounds.
 
-use super::bundle::{AHEAD, At, Bundle, Shared, Source, largest};
+use super::bundle::{AHEAD, At, Bundle, Columns, Segments, Shared, Source, largest};
 use super::frame::Frame;
 use super::presumed::Look;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
@@ -154,6 +154,8 @@ struct Lines {
     reach: V,
     /// See [`Groups::behind`].
     behind: V,
+    /// Where segments start, of rays without a common start.
+    start: Lanes3<V>,
     /// Segments have both of their natural ends: 0, and infinity or the common end.
     whole: bool,
 }
@@ -179,6 +181,11 @@ impl Groups {
         let (mut near, mut reach, mut front) = (most, V::splat(0.0), most);
         self.endless = true;
         let mut look = Look::default();
+        let columns = match bundle.source {
+            Source::Batch(rays) => Some(Columns::of(rays)),
+            Source::Pencil(..) => None,
+        };
+        let from = bundle.first / V::N;
         for q in 0..N {
             let mut lows = [[most; SET]; 2];
             // Greatest values as least negatives: one kind of shuffle tree does both.
@@ -187,16 +194,25 @@ impl Groups {
                 let g = q * SET + i;
                 self.of[g].slot = [NO_SLOT; 16];
                 let mut tame = if groups >> g & 1 != 0 { bundle.tame[g] } else { 0 };
-                if bundle.presumed && tame != 0 {
-                    bundle.prefetch(g + AHEAD);
-                    let Some(lanes) = bundle.look::<ANY>(g, &mut look) else { return false };
-                    (tame, bundle.tame[g]) = (lanes, lanes);
+                let mut segments = None;
+                if let Some(columns) = &columns
+                    && tame != 0
+                {
+                    let group = segments.insert(columns.get(from + g));
+                    if bundle.presumed {
+                        columns.prefetch(from + g + AHEAD);
+                        let Some(lanes) = bundle.look::<ANY>(g, group, &mut look) else { return false };
+                        (tame, bundle.tame[g]) = (lanes, lanes);
+                    }
                 }
                 if tame == 0 {
                     (self.of[g].inv_lo, self.of[g].inv_hi) = (most, most);
                     continue;
                 }
-                let lines = self.lines(bundle, g, tame);
+                let lines = match &segments {
+                    Some(segments) => self.lines(bundle, segments, tame),
+                    None => self.pencil_lines(bundle, g),
+                };
                 self.endless &= lines.whole;
                 if tame & !lines.fit != 0 {
                     return false;
@@ -204,7 +220,7 @@ impl Groups {
                 let lanes = Mask::from_bits(tame);
                 (self.of[g].s, self.of[g].t, self.of[g].slowness) = (lines.s, lines.t, lines.slowness);
                 if bundle.shared != Shared::Start {
-                    self.of[g].start = map3(bundle.starts(g), |x| x * V::splat(self.frame.scale));
+                    self.of[g].start = map3(lines.start, |x| x * V::splat(self.frame.scale));
                 }
                 lows[0][i] = select(lanes, lines.s, most);
                 lows[1][i] = select(lanes, lines.t, most);
@@ -311,49 +327,61 @@ impl Groups {
         2.0 * square / (depth * depth) * (N * SET * V::N) as f32 / (s * t)
     }
 
-    /// The lines of lanes `tame` of a group.
+    /// The lines of a group of a pencil.
     #[inline(always)]
-    fn lines(&self, bundle: &Bundle, g: usize, tame: u32) -> Lines {
+    fn pencil_lines(&self, bundle: &Bundle, g: usize) -> Lines {
+        let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
+        let [s, t] = match bundle.source {
+            Source::Pencil(pencil, middle) => pencil.places.around(bundle.first / V::N + g, middle).map(V::new),
+            Source::Batch(_) => [zero; 2],
+        };
+        let (slowness, start) = (V::splat(1.0 / self.frame.scale), [zero; 3]);
+        Lines { s, t, slowness, far: zero, near: infinite, fit: V::ALL, reach: zero, behind: zero, start, whole: true }
+    }
+
+    /// The lines of lanes `tame` of a group of rays in memory.
+    #[inline(always)]
+    fn lines(&self, bundle: &Bundle, segments: &Segments, tame: u32) -> Lines {
         let (zero, one, infinite) = (V::constant(0.0), V::constant(1.0), V::splat(f32::INFINITY));
-        if let Source::Pencil(pencil, middle) = bundle.source {
-            let [s, t] = pencil.places.around(bundle.first / V::N + g, middle);
-            let slowness = V::splat(1.0 / self.frame.scale);
-            let (s, t, near, fit) = (V::new(s), V::new(t), infinite, V::ALL);
-            return Lines { s, t, slowness, far: zero, near, fit, reach: zero, behind: zero, whole: true };
-        }
-        let direction = bundle.ways(g);
+        let Segments { org, dir, t_min, t_max } = *segments;
+        let apex = map3(bundle.apex, V::splat);
+        let direction = match bundle.shared {
+            Shared::Start | Shared::Behind => dir,
+            Shared::End(_) => each(|a| org[a] - apex[a]),
+        };
         let [x, y, speed] = self.frame.coordinates(direction);
         let slowness = one / speed;
         let (s, t) = (x * slowness, y * slowness);
         let mut fit = zero.cmp_lt(slowness) & slowness.cmp_lt(V::splat(f32::MAX));
-        let [t_min, t_max] = bundle.ends(g);
         // Most segments are whole: all that a ray or the way to a light has. They need no divisions.
         let is_whole = |end: V| (zero.cmp_eq(t_min) & end.cmp_eq(t_max)).bits() & tame == tame;
-        let mut behind = zero;
+        let starts = || each(|a| t_min.mul_add(dir[a], org[a]));
+        let (mut behind, mut start) = (zero, org);
         let (far, near, reach, whole) = match bundle.shared {
             Shared::Start if is_whole(infinite) => (zero, infinite, zero, true),
             Shared::End(At::One) if is_whole(one) => (slowness, infinite, largest(direction), true),
             Shared::Start => (slowness / t_max, slowness / t_min, zero, false),
             Shared::Behind => {
-                let starts = bundle.starts(g);
-                let way = each(|a| starts[a] - V::splat(bundle.apex[a]));
+                start = starts();
+                let way = each(|a| start[a] - apex[a]);
                 behind = dot(way, direction) / dot(direction, direction);
                 // Where a segment starts is told by the start itself.
                 (slowness / (t_max + behind), infinite, zero, false)
             }
             Shared::End(at) => {
+                start = starts();
                 let scale = match at {
                     At::One => one,
                     At::Limit => one / t_max,
                 };
                 // What is left of the way to the end at the segment's two ends. Subtracting from one is accurate
                 // to a few ulps as long as at least a quarter is left.
-                let (start, end) = (one - t_min * scale, one - t_max * scale);
-                fit = fit & V::constant(0.25).cmp_le(start);
-                (slowness / start, slowness / zero.fast_max(end), largest(direction), false)
+                let (left, end) = (one - t_min * scale, one - t_max * scale);
+                fit = fit & V::constant(0.25).cmp_le(left);
+                (slowness / left, slowness / zero.fast_max(end), largest(direction), false)
             }
         };
-        Lines { s, t, slowness, far, near, fit: fit.bits(), reach, behind, whole }
+        Lines { s, t, slowness, far, near, fit: fit.bits(), reach, behind, start, whole }
     }
 
     /// The smallest values of some linear functions over the tile's rectangle.

@@ -40,7 +40,7 @@ use super::{Generic, Scratch, stream, traverse};
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, HitPacket, Packet, Pencil, Rays};
 use crate::scene::world::{Object, World};
-use bundle::{Bundle, Shared};
+use bundle::{Bundle, Next, Shared};
 use exact::Exact;
 use presumed::First;
 
@@ -71,6 +71,9 @@ const BLOCK: usize = GROUPS * V::N;
 /// Calls with more rays than this write hits past the caches: they hold the last ones at most, and whoever asks so much at
 /// once does not read them at once.
 const MANY: usize = 2 * BLOCK;
+
+/// Groups of the next block that the memory is asked for at each step of a tile's way.
+const ASKED: usize = 2;
 
 /// Half the distance from 1 to the next number: the largest relative error of one operation.
 const HALF_ULP: f32 = f32::EPSILON / 2.0;
@@ -318,10 +321,11 @@ impl<'a> Job<'a> {
         if !self.memory.groups.load::<N, ANY, EXACT>(bundle, groups, self.world) {
             return false;
         }
-        let exact = Exact { bundle, world: self.world, object: self.world.first_object() };
+        let next = Next::of(self.rays, bundle.first + bundle.len * V::N);
+        let exact = Exact { bundle, world: self.world, object: self.world.first_object(), next };
         walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
-            bundle::prefetch_sample(self.rays, bundle.first + BLOCK, g);
+            exact.next.ask(ASKED);
             if !self.past {
                 self.output.prefetch(bundle.first + (g + bundle::AHEAD) * V::N);
             }

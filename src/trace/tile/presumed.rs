@@ -1,7 +1,7 @@
 //! Blocks that seem to have a point in common: their first group with a live ray says which, and who loads the others looks
 //! at them then. So rays are read from memory once.
 
-use super::bundle::{Bundle, Passing, Shared, Source, TAME, groups, load3};
+use super::bundle::{Bundle, Passing, Segments, Shared, Source, TAME, groups};
 use super::{GROUPS, SETS, V};
 use crate::lanes::{LaneMask, Lanes, Lanes3, each};
 use crate::ray::{Packet, Rays};
@@ -52,13 +52,11 @@ impl<'a> First<'a> {
 
 impl Bundle<'_> {
     /// Lanes of a group of a presumed bundle that are tame and, as far as one group tells, of the common point; `None` if another
-    /// lane is live. `ANY`: that may be an end.
+    /// lane is live. `segments`: its rays. `ANY`: the point may be an end.
     #[inline(always)]
-    pub fn look<const ANY: bool>(&self, g: usize, look: &mut Look) -> Option<u32> {
+    pub fn look<const ANY: bool>(&self, g: usize, segments: &Segments, look: &mut Look) -> Option<u32> {
         let Source::Batch(rays) = self.source else { return Some(self.tame[g]) };
-        let at = self.first + g * V::N;
-        let (org, dir) = (load3(&rays.org, at), load3(&rays.dir, at));
-        let [t_min, t_max] = self.ends(g);
+        let Segments { org, dir, t_min, t_max } = *segments;
         let sum = |v: Lanes3<V>| v[0].abs() + v[1].abs() + v[2].abs();
         let (size, least, most) = (sum(dir), V::splat(3.0 * TAME.0), V::splat(TAME.1));
         let mut lanes = least.cmp_le(size) & size.cmp_le(most) & V::constant(0.0).cmp_le(t_min) & t_min.cmp_le(t_max);
@@ -74,7 +72,7 @@ impl Bundle<'_> {
             }
         }
         let lanes = lanes.bits();
-        let is_whole = lanes == V::ALL || Packet::<V>::read(rays, at).2 & !lanes == 0;
+        let is_whole = lanes == V::ALL || Packet::<V>::read(rays, self.first + g * V::N).2 & !lanes == 0;
         is_whole.then_some(lanes)
     }
 

@@ -2,6 +2,7 @@
 //! at a time, by the common formula. What it finds becomes a depth in the frame, and is weighed against the tile's other
 //! hits as their own are.
 
+use super::bundle::Segments;
 use super::exact::Exact;
 use super::groups::Groups;
 use super::own::{Id, occlude};
@@ -20,7 +21,7 @@ use crate::trace::query::{Query, Stack};
 /// box; `None` if none does.
 #[inline(always)]
 pub fn enter(exact: &Exact, inst: u32, g: usize, limit: V, lanes: u32) -> Option<(Packet<V>, V, u32)> {
-    let ([org, dir], [t_min, t_max]) = exact.bundle.segments(g);
+    let Segments { org, dir, t_min, t_max } = exact.bundle.segments(g);
     // What is no number limits nothing.
     let t_max = limit.fast_min(t_max);
     let instance = &exact.world.instances[inst as usize];
