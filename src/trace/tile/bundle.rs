@@ -1,17 +1,13 @@
 //! What the rays of a block have in common: the point they start from, or (any-hit) the point they end in.
 
-use std::cell::Cell;
-
-use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
-use crate::lanes::words::{greatest, prefetch};
+use super::columns::{AHEAD, Columns, Segments};
+use super::{GROUPS, HALF_ULP, Mask, SET, V, select};
+use crate::lanes::words::greatest;
 use crate::lanes::{Column, LaneMask, Lanes, Lanes3, each, map3};
 use crate::ray::{Packet, Pencil, Rays};
 
 /// Directions and coordinates the tile's arithmetic is made for. Rays outside are left to the packet kernel.
 pub const TAME: (f32, f32) = (1e-15, 1e15);
-
-/// Groups between the one that is read (or written) and the one the memory is asked for.
-pub const AHEAD: usize = 8;
 
 /// Where rays go from and to, seen from the point they share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,89 +36,6 @@ pub enum Source<'a> {
     Batch(&'a Rays<f32>),
     /// They are made here, and their places counted from those of the ray in the middle.
     Pencil(&'a Pencil, [f64; 2]),
-}
-
-/// The rays of a group and their ends.
-#[derive(Clone, Copy, Debug)]
-pub struct Segments {
-    /// Origins.
-    pub org: Lanes3<V>,
-    /// Directions.
-    pub dir: Lanes3<V>,
-    /// Parameters of their starts.
-    pub t_min: V,
-    /// Parameters of their ends.
-    pub t_max: V,
-}
-
-/// Rays in memory, by groups: as many of all eight columns, so that one look at a group's number does for all.
-#[derive(Clone, Copy, Debug)]
-pub struct Columns<'a> {
-    org: Lanes3<&'a [V]>,
-    dir: Lanes3<&'a [V]>,
-    t_min: &'a [V],
-    t_max: &'a [V],
-}
-
-impl<'a> Columns<'a> {
-    /// Of a batch.
-    #[inline(always)]
-    pub fn of(rays: &'a Rays<f32>) -> Self {
-        let count = rays.padded_len() / V::N;
-        let groups = |column: &'a Column<f32>| &column.vectors()[..count];
-        let ([x, y, z], [dx, dy, dz]) = (&rays.org, &rays.dir);
-        Self {
-            org: [groups(x), groups(y), groups(z)],
-            dir: [groups(dx), groups(dy), groups(dz)],
-            t_min: groups(&rays.t_min),
-            t_max: groups(&rays.t_max),
-        }
-    }
-
-    /// Group `i` of the batch.
-    #[inline(always)]
-    pub fn get(&self, i: usize) -> Segments {
-        let Self { org: [x, y, z], dir: [dx, dy, dz], t_min, t_max } = *self;
-        Segments { org: [x[i], y[i], z[i]], dir: [dx[i], dy[i], dz[i]], t_min: t_min[i], t_max: t_max[i] }
-    }
-
-    /// Asks the memory for group `i`.
-    #[inline(always)]
-    pub fn prefetch(&self, i: usize) {
-        let Self { org: [x, y, z], dir: [dx, dy, dz], t_min, t_max } = *self;
-        for column in [x, y, z, dx, dy, dz, t_min, t_max] {
-            prefetch(column, i);
-        }
-    }
-}
-
-/// The rays that come after those of a tile: the memory is asked for them while the tile is traced, a few groups at a time.
-#[derive(Debug)]
-pub struct Next<'a> {
-    columns: Columns<'a>,
-    /// The group that is asked for next.
-    group: Cell<usize>,
-    /// Those from here on are for later tiles to ask for.
-    end: usize,
-}
-
-impl<'a> Next<'a> {
-    /// A block of `rays` from ray `first` on.
-    #[inline(always)]
-    pub fn of(rays: &'a Rays<f32>, first: usize) -> Self {
-        let group = first / V::N;
-        Self { columns: Columns::of(rays), group: Cell::new(group), end: group + GROUPS }
-    }
-
-    /// Asks for `count` groups.
-    #[inline(always)]
-    pub fn ask(&self, count: usize) {
-        let group = self.group.get();
-        if group < self.end {
-            (group..group + count).for_each(|i| self.columns.prefetch(i));
-            self.group.set(group + count);
-        }
-    }
 }
 
 /// Rays `first..first + 16 * groups` and their common point.
@@ -168,13 +81,6 @@ pub fn largest(v: Lanes3<V>) -> V {
 #[inline(always)]
 pub fn groups<const N: usize>(rays: &Rays<f32>, first: usize) -> usize {
     (rays.padded_len() - first).min(N * SET * V::N) / V::N
-}
-
-/// Asks the memory for what is looked at first: the first groups, and the sample that the first block's frame is made of.
-pub fn prefetch_first(rays: &Rays<f32>) {
-    let columns = Columns::of(rays);
-    (0..AHEAD).for_each(|g| columns.prefetch(g));
-    (0..SET).for_each(|k| columns.prefetch(SETS * k));
 }
 
 impl<'a> Bundle<'a> {

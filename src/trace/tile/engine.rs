@@ -1,12 +1,16 @@
 //! The engine as others see it.
 
-use super::{Job, MANY, Tile};
+use super::{BLOCK, Job, Tile};
 use crate::lanes::past::arrived;
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, Hits, Pencil, Rays};
 use crate::scene::world::World;
 use crate::trace::output::Output;
 use crate::trace::{Engine, Scratch};
+
+/// Calls with more rays than this write hits past the caches: they hold the last ones at most, and whoever asks so much at
+/// once does not read them at once.
+pub const MANY: usize = 2 * BLOCK;
 
 impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
     fn name(&self) -> &'static str {

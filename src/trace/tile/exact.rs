@@ -1,7 +1,8 @@
 //! Where the common formula has the word: doubtful pairs while a tile is traced, and the numbers of its final hits.
 
 use super::batch::Planes;
-use super::bundle::{Bundle, Next};
+use super::bundle::Bundle;
+use super::columns::Next;
 use super::groups::{Groups, NO_SLOT, bounded};
 use super::{HALF_ULP, Mask, V, select};
 use crate::lanes::chosen::merge;

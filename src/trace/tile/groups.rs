@@ -1,7 +1,9 @@
 //! The rays of a tile: up to 64 groups of 16 (4x4 pixels), each ray as (s, t), its depth as 1/z between two bounds.
 
-use super::bundle::{AHEAD, At, Bundle, Columns, Segments, Shared, Source, largest};
+use super::bundle::{Bundle, Shared, Source};
+use super::columns::{AHEAD, Columns};
 use super::frame::Frame;
+use super::lines::Lines;
 use super::presumed::Look;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::words::{greatest, least, row_minima, row_minima_of};
@@ -138,28 +140,6 @@ impl Default for Groups {
     }
 }
 
-/// One group's rays in the frame.
-struct Lines {
-    s: V,
-    t: V,
-    /// Parameter per unit of depth (common start), or the reciprocal depth at t = 0 (common end).
-    slowness: V,
-    /// 1/z at the far end of the segment.
-    far: V,
-    /// 1/z at its near end.
-    near: V,
-    /// Lanes that the tile's arithmetic can take.
-    fit: u32,
-    /// Distance from the common end (0 for a common start).
-    reach: V,
-    /// See [`Groups::behind`].
-    behind: V,
-    /// Where segments start, of rays without a common start.
-    start: Lanes3<V>,
-    /// Segments have both of their natural ends: 0, and infinity or the common end.
-    whole: bool,
-}
-
 impl Groups {
     /// Takes in some groups of the first `N` sets of a bundle that looks at `world`. False if they spread too wide for one
     /// frame (nothing is traced then).
@@ -210,8 +190,8 @@ impl Groups {
                     continue;
                 }
                 let lines = match &segments {
-                    Some(segments) => self.lines(bundle, segments, tame),
-                    None => self.pencil_lines(bundle, g),
+                    Some(segments) => Lines::of(&self.frame, bundle, segments, tame),
+                    None => Lines::of_pencil(&self.frame, bundle, g),
                 };
                 self.endless &= lines.whole;
                 if tame & !lines.fit != 0 {
@@ -325,63 +305,6 @@ impl Groups {
         let [s, t] = self.bounds.map(|[lo, hi]| hi - lo);
         // Half of the square around the sphere around it: a guess.
         2.0 * square / (depth * depth) * (N * SET * V::N) as f32 / (s * t)
-    }
-
-    /// The lines of a group of a pencil.
-    #[inline(always)]
-    fn pencil_lines(&self, bundle: &Bundle, g: usize) -> Lines {
-        let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
-        let [s, t] = match bundle.source {
-            Source::Pencil(pencil, middle) => pencil.places.around(bundle.first / V::N + g, middle).map(V::new),
-            Source::Batch(_) => [zero; 2],
-        };
-        let (slowness, start) = (V::splat(1.0 / self.frame.scale), [zero; 3]);
-        Lines { s, t, slowness, far: zero, near: infinite, fit: V::ALL, reach: zero, behind: zero, start, whole: true }
-    }
-
-    /// The lines of lanes `tame` of a group of rays in memory.
-    #[inline(always)]
-    fn lines(&self, bundle: &Bundle, segments: &Segments, tame: u32) -> Lines {
-        let (zero, one, infinite) = (V::constant(0.0), V::constant(1.0), V::splat(f32::INFINITY));
-        let Segments { org, dir, t_min, t_max } = *segments;
-        let apex = map3(bundle.apex, V::splat);
-        let direction = match bundle.shared {
-            Shared::Start | Shared::Behind => dir,
-            Shared::End(_) => each(|a| org[a] - apex[a]),
-        };
-        let [x, y, speed] = self.frame.coordinates(direction);
-        let slowness = one / speed;
-        let (s, t) = (x * slowness, y * slowness);
-        let mut fit = zero.cmp_lt(slowness) & slowness.cmp_lt(V::splat(f32::MAX));
-        // Most segments are whole: all that a ray or the way to a light has. They need no divisions.
-        let is_whole = |end: V| (zero.cmp_eq(t_min) & end.cmp_eq(t_max)).bits() & tame == tame;
-        let starts = || each(|a| t_min.mul_add(dir[a], org[a]));
-        let (mut behind, mut start) = (zero, org);
-        let (far, near, reach, whole) = match bundle.shared {
-            Shared::Start if is_whole(infinite) => (zero, infinite, zero, true),
-            Shared::End(At::One) if is_whole(one) => (slowness, infinite, largest(direction), true),
-            Shared::Start => (slowness / t_max, slowness / t_min, zero, false),
-            Shared::Behind => {
-                start = starts();
-                let way = each(|a| start[a] - apex[a]);
-                behind = dot(way, direction) / dot(direction, direction);
-                // Where a segment starts is told by the start itself.
-                (slowness / (t_max + behind), infinite, zero, false)
-            }
-            Shared::End(at) => {
-                start = starts();
-                let scale = match at {
-                    At::One => one,
-                    At::Limit => one / t_max,
-                };
-                // What is left of the way to the end at the segment's two ends. Subtracting from one is accurate
-                // to a few ulps as long as at least a quarter is left.
-                let (left, end) = (one - t_min * scale, one - t_max * scale);
-                fit = fit & V::constant(0.25).cmp_le(left);
-                (slowness / left, slowness / zero.fast_max(end), largest(direction), false)
-            }
-        };
-        Lines { s, t, slowness, far, near, fit: fit.bits(), reach, behind, start, whole }
     }
 
     /// The smallest values of some linear functions over the tile's rectangle.

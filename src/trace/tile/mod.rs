@@ -16,6 +16,7 @@
 
 mod batch;
 mod bundle;
+mod columns;
 mod edges;
 mod engine;
 mod exact;
@@ -23,6 +24,7 @@ mod fine;
 mod frame;
 mod groups;
 mod held;
+mod lines;
 mod listing;
 mod mirror;
 mod node;
@@ -40,7 +42,9 @@ use super::{Generic, Scratch, stream, traverse};
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, HitPacket, Packet, Pencil, Rays};
 use crate::scene::world::{Object, World};
-use bundle::{Bundle, Next, Shared};
+use bundle::{Bundle, Shared};
+use columns::{AHEAD, Next};
+use engine::MANY;
 use exact::Exact;
 use presumed::First;
 
@@ -67,13 +71,6 @@ const GROUPS: usize = SETS * SET;
 
 /// Most rays in a tile.
 const BLOCK: usize = GROUPS * V::N;
-
-/// Calls with more rays than this write hits past the caches: they hold the last ones at most, and whoever asks so much at
-/// once does not read them at once.
-const MANY: usize = 2 * BLOCK;
-
-/// Groups of the next block that the memory is asked for at each step of a tile's way.
-const ASKED: usize = 2;
 
 /// Half the distance from 1 to the next number: the largest relative error of one operation.
 const HALF_ULP: f32 = f32::EPSILON / 2.0;
@@ -177,8 +174,7 @@ impl<'a> Job<'a> {
         }
         // What one call learns must not change what another one answers.
         self.memory.slabs.forget();
-        // Later ones are asked for while those before them are read, or written.
-        bundle::prefetch_first(self.rays);
+        columns::prefetch_first(self.rays);
         for first in (0..self.rays.len()).step_by(BLOCK) {
             if !suits {
                 self.leave::<SETS>(first);
@@ -325,9 +321,9 @@ impl<'a> Job<'a> {
         let exact = Exact { bundle, world: self.world, object: self.world.first_object(), next };
         walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
-            exact.next.ask(ASKED);
+            exact.next.ask();
             if !self.past {
-                self.output.prefetch(bundle.first + (g + bundle::AHEAD) * V::N);
+                self.output.prefetch(bundle.first + (g + AHEAD) * V::N);
             }
             self.finish::<ANY, EXACT, COUNT>(&exact, g);
         }

@@ -1,7 +1,8 @@
 //! Blocks that seem to have a point in common: their first group with a live ray says which, and who loads the others looks
 //! at them then. So rays are read from memory once.
 
-use super::bundle::{Bundle, Passing, Segments, Shared, Source, TAME, groups};
+use super::bundle::{Bundle, Passing, Shared, Source, TAME, groups};
+use super::columns::Segments;
 use super::{GROUPS, SETS, V};
 use crate::lanes::{LaneMask, Lanes, Lanes3, each};
 use crate::ray::{Packet, Rays};

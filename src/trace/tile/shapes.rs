@@ -2,7 +2,7 @@
 //! at a time, by the common formula. What it finds becomes a depth in the frame, and is weighed against the tile's other
 //! hits as their own are.
 
-use super::bundle::Segments;
+use super::columns::Segments;
 use super::exact::Exact;
 use super::groups::Groups;
 use super::own::{Id, occlude};

@@ -9,7 +9,7 @@ use super::pairs::flush;
 use super::place::{self, Place};
 use super::shapes;
 use super::slab::Space;
-use super::{ASKED, GROUPS, HALF_ULP, Memory, SET, V};
+use super::{GROUPS, HALF_ULP, Memory, SET, V};
 use crate::bvh::{Child, Node, Nodes, Tree, WIDE};
 use crate::lanes::Lanes;
 use crate::lanes::words::{least_key, prefetch};
@@ -112,7 +112,7 @@ fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool
             continue;
         }
         level.remove(slot);
-        exact.next.ask(ASKED);
+        exact.next.ask();
         let mut met = level.groups_at::<N>(slot, &memory.groups);
         let node = &nodes[level.node as usize];
         let child = node.child(slot);
