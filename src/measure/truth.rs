@@ -202,13 +202,18 @@ mod tests {
     use crate::scene::assembly::Assembly;
     use crate::scene::description::{Description, Item, ItemKind, Shape};
 
-    /// The half-space below z = 0 and rays that fall from z = 1, 2, 3: t = 1, 2, 3.
-    #[test]
-    fn a_wrong_answer_is_counted_with_its_ray() {
+    /// The half-space below z = 0.
+    fn floor() -> Oracle {
         let mut scene = Description::new("floor");
         let kind = ItemKind::Shape(Shape::HalfSpace);
         scene.groups[0].items.push(Item { transform: glam::DAffine3::IDENTITY, material: None, kind });
-        let oracle = Oracle::new(&Assembly::new(&scene).unwrap());
+        Oracle::new(&Assembly::new(&scene).unwrap())
+    }
+
+    /// Rays that fall on it from z = 1, 2, 3: t = 1, 2, 3.
+    #[test]
+    fn a_wrong_answer_is_counted_with_its_ray() {
+        let oracle = floor();
         let batches = crate::measure::testing::falling_rays::<f32>(&[2, 1]);
         let mut hits = [Hits::new(2), Hits::new(1)];
         for (b, i, t) in [(0, 0, 1.0), (0, 1, 2.0), (1, 0, 3.0)] {
@@ -231,10 +236,7 @@ mod tests {
     /// As above: the third ray's answer is a rounding off in one list and wrong in the other.
     #[test]
     fn both_answers_must_be_explained() {
-        let mut scene = Description::new("floor");
-        let kind = ItemKind::Shape(Shape::HalfSpace);
-        scene.groups[0].items.push(Item { transform: glam::DAffine3::IDENTITY, material: None, kind });
-        let oracle = Oracle::new(&Assembly::new(&scene).unwrap());
+        let oracle = floor();
         let batches = crate::measure::testing::falling_rays::<f32>(&[2, 1]);
         let answers = |third: f32| {
             let mut hits = [Hits::new(2), Hits::new(1)];
