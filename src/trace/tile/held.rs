@@ -40,7 +40,7 @@ pub struct Edges {
     /// Lanes surely inside: possible, too.
     pub certain: Mask,
     /// Weights of the second and third corner, times 1/z.
-    weights: [V; 2],
+    pub weights: [V; 2],
 }
 
 /// What a triangle and a group came to.

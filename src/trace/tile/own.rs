@@ -60,7 +60,8 @@ fn keep(groups: &mut Groups, g: usize, hit: Mask, inverse: V, found: [V; 2]) {
 
 /// [`Plane::meet`] where edges need more digits than f32 has: for rays that pass an edge within its rounding, and for the weights of
 /// slivers and of triangles much smaller than a pixel. What is not certainly outside is looked at again in f64, for the same
-/// corners and rays; so is what was found.
+/// corners and rays; so is what was found in a triangle whose weights need it. A lane that is certain keeps the weights of
+/// [`Plane::meet`], whatever brought its group here: another order of triangles brings others.
 #[cold]
 #[inline(never)]
 pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
@@ -72,8 +73,8 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     to_end: bool,
 ) -> bool {
     let (plane, line) = (Plane::of(planes, i), Line::of(groups, g));
-    let (inverse, best) = (plane.depth(&line), line.best);
-    let mut maybe = plane.edges(&line).possible & inverse.cmp_le(groups.of[g].inv_hi);
+    let (inverse, best, edges) = (plane.depth(&line), line.best, plane.edges(&line));
+    let mut maybe = edges.possible & inverse.cmp_le(groups.of[g].inv_hi);
     if ANY && to_end {
         maybe = maybe & V::constant(0.0).cmp_le(plane.behind(&line)) & best.cmp_lt(V::splat(f32::INFINITY));
     } else {
@@ -87,15 +88,19 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
             maybe = maybe & V::constant(0.0).cmp_le(ahead);
         }
     }
-    let (hit, weights) = exact_weights(groups, planes, g, i, maybe.bits());
+    let (inside, weights) = exact_weights(groups, planes, g, i, maybe.bits());
     if ANY {
-        return occlude(groups, g, hit);
+        return occlude(groups, g, inside);
     }
+    let certain = edges.certain & maybe;
+    let hit = inside | certain;
+    let keeps = if planes.unsteady >> i & 1 != 0 { Mask::from_bits(0) } else { certain };
     if groups.is_behind {
         groups.ahead[g] = select(hit, plane.share(ahead), groups.ahead[g]);
     }
     id.name::<MANY>(groups, g, hit);
-    keep(groups, g, hit, inverse, weights.map(|w| w * inverse));
+    let weights = [0, 1].map(|k| select(keeps, edges.weights[k], weights[k] * inverse));
+    keep(groups, g, hit, inverse, weights);
     hit.any()
 }
 

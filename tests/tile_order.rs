@@ -1,0 +1,92 @@
+//! The tile's own arithmetic decides per ray and triangle: another tree over the same triangles, in which they are met in another
+//! order and beside other ones, must give the same bits.
+
+mod common;
+mod tile_support;
+
+use std::sync::Arc;
+
+use common::{Random, ball, item, soup};
+use glam::{DAffine3, DVec3};
+use lanecast::ray::{Hits, Rays};
+use lanecast::scene::description::{Description, ItemKind};
+use lanecast::scene::mesh::Mesh;
+use lanecast::scene::world::{BuildSettings, Preset, World};
+use lanecast::trace::Scratch;
+use tile_support::{camera, find, mirrored, shadows};
+
+/// One world with three trees.
+fn worlds(meshes: &[Mesh]) -> [World<f32>; 3] {
+    let mut d = Description::new("meshes");
+    for (i, mesh) in meshes.iter().enumerate() {
+        d.meshes.push(Arc::new(mesh.clone()));
+        d.groups[0].items.push(item(ItemKind::Mesh(i as u32), DAffine3::IDENTITY));
+    }
+    let of = |preset, leaf| World::compile(&d, BuildSettings { preset, leaf }).unwrap();
+    [of(Preset::Balanced, 8), of(Preset::Fast, 8), of(Preset::Balanced, 1)]
+}
+
+/// t, u, v, primitive and instance of every ray, as bits; whether it hits anything.
+fn answers(world: &World<f32>, rays: &Rays<f32>) -> (Vec<[u32; 5]>, Vec<u8>) {
+    let (mut hits, mut any, mut scratch) = (Hits::default(), Vec::new(), Scratch::default());
+    find("tile").intersect(world, rays, &mut hits, &mut scratch, None);
+    find("tile").occluded(world, rays, &mut any, &mut scratch, None);
+    let bits = |i: usize| [hits.t[i].to_bits(), hits.u[i].to_bits(), hits.v[i].to_bits(), hits.prim[i], hits.inst[i]];
+    ((0..rays.len()).map(bits).collect(), any)
+}
+
+/// Rays from `eye` to vertices and edges of a mesh, neighbours in the mesh side by side.
+fn at_edges(mesh: &Mesh, eye: DVec3, r: &mut Random) -> Rays<f32> {
+    let mut rays = Rays::new(4096);
+    for i in 0..rays.len() {
+        let corner = mesh.triangles[i / 4 % mesh.triangles.len()].map(|v| mesh.positions[v as usize]);
+        let along = if i % 4 == 0 { 0.0 } else { r.unit() };
+        let target = corner[i % 3].lerp(corner[(i + 1) % 3], along);
+        rays.set(i, eye.as_vec3().to_array(), (target - eye).as_vec3().to_array(), 0.0, f32::INFINITY);
+    }
+    rays
+}
+
+#[test]
+fn another_tree_gives_the_same_bits() {
+    let mut r = Random(3);
+    let fine = ball(120, 160);
+    let room = {
+        let mut walls = ball(2, 4);
+        walls.positions.iter_mut().for_each(|p| *p *= 12.0);
+        vec![walls, soup(800, &mut r)]
+    };
+    let twice = soup(3000, &mut r);
+    for (name, meshes) in [
+        ("soup", vec![soup(6000, &mut r)]),
+        ("every triangle twice", vec![twice.clone(), twice]),
+        ("fine ball", vec![fine]),
+        ("room", room),
+    ] {
+        let worlds = worlds(&meshes);
+        let nodes = worlds.each_ref().map(|world| world.first_object().tree.nodes.len());
+        assert!(nodes[0] < nodes[2], "{name}: {nodes:?}");
+        let (mut rays, mut hits, mut differ) = (0, 0, [0; 2]);
+        for case in 0..16 {
+            let eye = r.in_cube() * [2.5, 8.0][case % 2];
+            let primary = match case % 4 {
+                3 => at_edges(&meshes[0], eye, &mut r),
+                _ => camera(eye, r.in_cube(), [0.1, 0.5, 1.0][case % 3], 96),
+            };
+            let light = 6.0 * r.in_cube();
+            for rays_of in [mirrored(&worlds[0], &primary), shadows(&worlds[0], &primary, light, 1.0, 1e-4), primary] {
+                let wanted = answers(&worlds[0], &rays_of);
+                rays += rays_of.live_count();
+                hits += wanted.0.iter().filter(|hit| hit[3] != u32::MAX).count();
+                for world in &worlds[1..] {
+                    let (closest, any) = answers(world, &rays_of);
+                    differ[0] += closest.iter().zip(&wanted.0).filter(|(x, y)| x != y).count();
+                    differ[1] += any.iter().zip(&wanted.1).filter(|(x, y)| x != y).count();
+                }
+            }
+        }
+        println!("{name}: {rays} rays, {hits} hits; {differ:?} answers differ");
+        assert!(hits > 50_000, "{name}: {hits}");
+        assert_eq!(differ, [0, 0], "{name}");
+    }
+}
