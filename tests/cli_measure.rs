@@ -67,6 +67,38 @@ fn bench_prints_a_table_and_writes_rows_facts_and_a_picture() {
     assert!(facts.contains(said) && said.contains(" GHz: multiply") && said.contains(" per cycle"), "{said}");
 }
 
+/// Three threads, however many cores there are: rows of one, two and three, with one checksum.
+#[test]
+fn scaling_has_rows_of_each_number_of_threads() {
+    let dir = square();
+    let line = "bench square.ply --size 64x32 --rays primary,ao --engines scalar,tile --repeat 3 --threads 3 --scaling";
+    let table = run(&dir, line).out;
+    let heading = table.lines().find(|line| line.contains("each")).expect("the table of threads");
+    assert_eq!(
+        heading.split_whitespace().collect::<Vec<_>>(),
+        ["rays", "engine", "1", "each", "2", "each", "3", "each"]
+    );
+    let of_threads = table.split(heading).nth(1).expect("its lines").lines().filter(|line| line.contains("100%"));
+    assert_eq!(of_threads.count(), 2 * 2, "{table}");
+    let report = run(&dir, &format!("{line} --json")).json();
+    let rows = report["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 2 * 2 * 3, "{report}");
+    for class in ["primary", "ao"] {
+        for engine in ["scalar", "tile"] {
+            let of: Vec<_> = rows.iter().filter(|row| row["class"] == class && row["engine"] == engine).collect();
+            let mut threads: Vec<_> = of.iter().filter_map(|row| row["threads"].as_u64()).collect();
+            threads.sort_unstable();
+            assert_eq!(threads, [1, 2, 3]);
+            for row in &of {
+                let (timed, each) = (&row["outcome"]["timed"], row["efficiency"].as_f64().expect("efficiency"));
+                assert_eq!(timed["checksum"], of[0]["outcome"]["timed"]["checksum"], "{report}");
+                assert!(if row["threads"] == 1 { each == 1.0 } else { each > 0.0 }, "{row}");
+            }
+        }
+    }
+    binary::refused(dir.path(), &["bench", "square.ply", "--threads", "1", "--scaling"], "--threads 2 or more");
+}
+
 #[test]
 fn peers_are_rows_and_a_missing_one_says_so() {
     let dir = square();

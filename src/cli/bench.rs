@@ -20,6 +20,7 @@ use crate::measure::history;
 use crate::measure::peers::Invitation;
 use crate::measure::raysets::RayKind;
 use crate::measure::rows::{self, LEGEND, Outcome, Row, Run};
+use crate::measure::scaling;
 use crate::measure::timing::Workers;
 use crate::scene::description::{Description, Precision};
 use crate::trace::Engines;
@@ -34,6 +35,7 @@ const EXAMPLES: &str = "\
 Examples:
   lanecast bench
   lanecast bench model.ply --rays primary,ao --engines scalar,packet16 --threads 1
+  lanecast bench model.ply --rays primary,diffuse --engines auto --threads 16 --scaling
   lanecast bench model.ply --size 1024x576 --eye 0,1,5 --look-at 0,1,0 -o results
   lanecast bench model.ply --peers obvhs,embree --embree libembree4.so.4 --threads 1
   lanecast bench model.ply --against ../old/lanecast --turns 8 --engines scalar,tile
@@ -75,6 +77,9 @@ pub struct BenchArgs {
     camera: CameraArgs,
     #[command(flatten)]
     threads: ThreadArgs,
+    /// Run engines on 1, 2, 4, ... threads up to --threads in the same rounds, and say what each thread adds
+    #[arg(long, conflicts_with_all = ["compare", "experiment", "against"])]
+    scaling: bool,
     /// Timed rounds
     #[arg(long, value_name = "R", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     repeat: u32,
@@ -149,7 +154,13 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     }
     args.invitation().check()?;
     // Peers ask for it, and then our engines get it too.
-    let workers = Workers::new(args.threads.count())?.flushing(!args.peers.is_empty());
+    let mut workers = Workers::new(args.threads.count())?.flushing(!args.peers.is_empty());
+    if args.scaling {
+        workers = workers.with_fewer()?;
+        if workers.fewer().is_empty() {
+            return Err(Error::Usage("--scaling compares numbers of threads: expected --threads 2 or more".into()));
+        }
+    }
     let run = Run::now(workers.threads());
     let ports = workers.install(Ports::measure);
     let facts = env::facts(workers.threads(), &ports);
@@ -161,7 +172,8 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     if args.output.json {
         json_to_stdout(&Report { run: &run, ports: &ports, rows: &rows })?;
     } else if !rows.is_empty() {
-        to_stdout(&format!("{}{LEGEND}", rows::table(&rows)))?;
+        let all = rows.iter().filter(|row| row.threads == workers.threads()).cloned().collect::<Vec<_>>();
+        to_stdout(&format!("{}{LEGEND}{}", rows::table(&all), scaling::table(&rows)))?;
     }
     if let (Some(dir), false) = (&args.folder, rows.is_empty()) {
         write(dir, &run, &rows, &facts)?;

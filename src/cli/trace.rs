@@ -176,8 +176,8 @@ fn trace<S: Engines>(args: &TraceArgs, query: Query, description: &Description, 
     let batches = split::<S>(rays, workers.threads());
     let answers = checked(&workers, engine, &world, &batches, query)?;
 
-    let mut series = [Series::new(Tracer::Engine(engine), answers)];
-    interleave(&workers, &world, Load::packed(&batches), &mut series, (0, args.repeat), &stopped)?;
+    let mut series = [Series::new(&workers, Tracer::Engine(engine), answers)];
+    interleave(&world, Load::packed(&batches), &mut series, (0, args.repeat), &stopped)?;
     let [Series { answers, seconds, .. }] = series;
     if let Some(path) = &args.hits {
         match &answers {

@@ -131,32 +131,35 @@ impl<S: Engines> Subject<'_, S> {
         let rejected = self.rejected(batches, &scalar, rays);
 
         let (mut series, mut entries) = (Vec::new(), Vec::new());
-        for tracer in self.tracers() {
+        for (workers, tracer) in self.tracers() {
             if stop() {
                 return Err(Error::Interrupted);
             }
             let admission = match tracer {
-                Tracer::Engine(engine) => self.admit(engine, load, &scalar, rays, rejected.as_deref()),
+                Tracer::Engine(engine) => self.admit(workers, engine, load, &scalar, rejected.as_deref()),
                 Tracer::Peer(peer) => self.admit_peer(peer, batches, &scalar),
             };
             entries.push(Entry {
+                workers,
                 tracer,
                 place: admission.map(|(answers, agreement)| {
-                    series.push(Series::new(tracer, answers));
+                    series.push(Series::new(workers, tracer, answers));
                     (series.len() - 1, agreement)
                 }),
             });
         }
-        interleave(self.workers, self.world, load, &mut series, (WARM_UP, repeat), stop)?;
+        interleave(self.world, load, &mut series, (WARM_UP, repeat), stop)?;
         self.rows(kind, batches, rays, entries, &series).into_iter().for_each(report);
         Ok(())
     }
 
-    /// Our engines, then all modes of all peers that are there.
-    fn tracers(&self) -> Vec<Tracer<'_, S>> {
-        let engines = self.engines.iter().map(|&engine| Tracer::Engine(engine));
+    /// Our engines, the same on fewer threads, then all modes of all peers that are there.
+    fn tracers(&self) -> Vec<(&Workers, Tracer<'_, S>)> {
+        let teams = [self.workers].into_iter().chain(self.workers.fewer());
+        let engines =
+            teams.flat_map(|workers| self.engines.iter().map(move |&engine| (workers, Tracer::Engine(engine))));
         let modes = self.guests.iter().filter_map(|guest| guest.modes.as_ref().ok()).flatten();
-        engines.chain(modes.map(|peer| Tracer::Peer(&**peer))).collect()
+        engines.chain(modes.map(|peer| (self.workers, Tracer::Peer(&**peer)))).collect()
     }
 
     /// One row per entry, and one for each peer that is missing.
@@ -169,19 +172,27 @@ impl<S: Engines> Subject<'_, S> {
         series: &[Series<'_, S>],
     ) -> Vec<Row> {
         let of_engines = series.iter().filter(|s| matches!(s.tracer, Tracer::Engine(_)));
-        let scalar = of_engines.clone().find(|s| name(s.tracer) == "scalar").map(|s| &s.seconds[..]);
-        let best = of_engines.min_by(|a, b| mid(a).total_cmp(&mid(b))).map(|s| &s.seconds[..]);
+        let engine_on = |engine: &str, threads: usize| {
+            let is_it = |s: &&Series<'_, S>| s.workers.threads() == threads && name(s.tracer) == engine;
+            of_engines.clone().find(is_it).map(|s| &s.seconds[..])
+        };
+        let efficiency = |one: &Series<'_, S>| {
+            let ratio = paired_ratio_median(engine_on(name(one.tracer), 1)?, &one.seconds)?;
+            Some(ratio / one.workers.threads() as f64)
+        };
+        let of_all_threads = of_engines.clone().filter(|s| s.workers.threads() == self.workers.threads());
+        let best = of_all_threads.min_by(|a, b| mid(a).total_cmp(&mid(b))).map(|s| &s.seconds[..]);
         let fastest = |name_of_peer: &str| {
             let modes = (0..series.len()).filter(|&i| name(series[i].tracer) == name_of_peer);
             modes.min_by(|&a, &b| mid(&series[a]).total_cmp(&mid(&series[b])))
         };
-        let row = |engine, scene, peer, agreement: &Agreement, outcome| {
+        let row = |engine, scene, (threads, efficiency), peer, agreement: &Agreement, outcome| {
             let (ties, differences) = (agreement.ties, agreement.differences());
             let (class, query, precision) = (kind.name(), kind.query().name(), S::PRECISION);
-            Row { scene, class, query, engine, precision, rays, ties, differences, peer, outcome }
+            Row { scene, class, query, engine, precision, threads, rays, ties, differences, efficiency, peer, outcome }
         };
         let mut rows = Vec::new();
-        for Entry { tracer, place } in entries {
+        for Entry { workers, tracer, place } in entries {
             let one = place.as_ref().ok().map(|(place, _)| (&series[*place], *place));
             let peer = match tracer {
                 Tracer::Engine(_) => None,
@@ -192,18 +203,27 @@ impl<S: Engines> Subject<'_, S> {
                     lead: one.and_then(|(one, _)| paired_ratio_median(&one.seconds, best?)),
                 }),
             };
+            let threads = workers.threads();
+            let efficiency = match tracer {
+                Tracer::Engine(_) if !self.workers.fewer().is_empty() => one.and_then(|(one, _)| efficiency(one)),
+                _ => None,
+            };
             let (agreement, outcome) = match place {
-                Ok((place, agreement)) => (agreement, self.outcome(&series[place], scalar, batches, kind)),
+                Ok((place, agreement)) => {
+                    (agreement, self.outcome(&series[place], engine_on("scalar", threads), batches, kind))
+                }
                 Err(outcome) => (Agreement::default(), Some(*outcome)),
             };
-            let row = |outcome| row(name(tracer), self.facts_of(tracer), peer, &agreement, outcome);
+            let on = (threads, efficiency);
+            let row = |outcome| row(name(tracer), self.facts_of(tracer), on, peer, &agreement, outcome);
             rows.extend(outcome.map(row));
         }
         for guest in &self.guests {
             if let Err(why) = &guest.modes {
                 let peer = PeerRow { quoted: true, ..Default::default() };
                 let scene = SceneFacts { build_seconds: 0.0, bytes: 0, ..self.facts.clone() };
-                rows.push(row(guest.name, scene, Some(peer), &Agreement::default(), Outcome::Skipped(why.clone())));
+                let on = (self.workers.threads(), None);
+                rows.push(row(guest.name, scene, on, Some(peer), &Agreement::default(), Outcome::Skipped(why.clone())));
             }
         }
         rows
@@ -258,12 +278,13 @@ impl<S: Engines> Subject<'_, S> {
     /// Answers that may be timed, or why there will be no figure.
     fn admit(
         &self,
+        workers: &Workers,
         engine: &dyn Engine<S>,
         load: Load<'_, S>,
         scalar: &Answers<S>,
-        rays: u64,
         rejected: Option<&str>,
     ) -> Admission<S> {
+        let rays: u64 = load.batches.iter().map(|b| b.len() as u64).sum();
         let tests = rays.saturating_mul(self.world.assembly.instanced_prims());
         if engine.name() == "brute" && tests > BRUTE_LIMIT {
             let why = format!("{tests} ray-primitive tests per pass, limit {BRUTE_LIMIT}");
@@ -273,7 +294,7 @@ impl<S: Engines> Subject<'_, S> {
             return Err(Box::new(Outcome::Wrong(why.into())));
         }
         let mut answers = scalar.clone();
-        Tracer::Engine(engine).pass(self.workers, self.world, load, &mut answers);
+        Tracer::Engine(engine).pass(workers, self.world, load, &mut answers);
         let oracle = || Cow::Borrowed(self.oracle);
         let admitted = self.workers.install(|| truth::admit(engine, load.batches, scalar, &answers, oracle));
         admitted.map(|agreement| (answers, agreement)).map_err(|why| Box::new(Outcome::Wrong(why)))
@@ -293,7 +314,7 @@ impl<S: Engines> Subject<'_, S> {
         };
         let lane_use = |active: u64, total: u64| (total > 0).then(|| active as f64 / total as f64);
         // Every thread has the time of the pass.
-        let of_limit = |costs: &Costs| Limit::of(costs, &counters, seconds.median * self.workers.threads() as f64);
+        let of_limit = |costs: &Costs| Limit::of(costs, &counters, seconds.median * one.workers.threads() as f64);
         let percent_of_limit = self.costs.as_ref().and_then(of_limit).map(|limit| limit.percent);
         Some(Outcome::Timed {
             seconds,
@@ -311,6 +332,7 @@ impl<S: Engines> Subject<'_, S> {
 
 /// One tracer's place among the series with how its answers compare, or why it has none.
 struct Entry<'a, S> {
+    workers: &'a Workers,
     tracer: Tracer<'a, S>,
     place: std::result::Result<(usize, Agreement), Box<Outcome>>,
 }

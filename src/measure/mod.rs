@@ -16,6 +16,7 @@ pub mod pictures;
 pub mod raysets;
 pub mod report;
 pub mod rows;
+pub mod scaling;
 pub mod stats;
 pub mod timing;
 pub mod truth;

@@ -17,7 +17,7 @@ pub struct Run {
     pub isa: &'static str,
     /// CPU model.
     pub cpu: String,
-    /// Threads that traced.
+    /// Threads that traced, at most.
     pub threads: usize,
     /// The command as typed.
     pub command: String,
@@ -109,12 +109,16 @@ pub struct Row {
     pub engine: &'static str,
     /// `f32` or `f64`.
     pub precision: &'static str,
+    /// Threads that traced.
+    pub threads: usize,
     /// Rays in the set, dead ones included.
     pub rays: u64,
     /// Rays with `scalar`'s t and another primitive: shared edges, coincident surfaces.
     pub ties: u64,
     /// Rays with another answer than `scalar`'s (few, or there would be no figure).
     pub differences: u64,
+    /// Of several numbers of threads: times as fast as one thread, pass by pass, per thread.
+    pub efficiency: Option<f64>,
     /// What only peers have.
     pub peer: Option<PeerRow>,
     /// The rest.
@@ -131,7 +135,7 @@ impl Row {
 const COLUMNS: &str = "revision,date,cpu,isa,flags,threads,scene,scene_hash,prims,class,query,engine,precision,rays,\
     status,hits,repeat,best_mrays_per_s,median_mrays_per_s,spread,mad_seconds,ratio_to_scalar,node_lane_use,\
     prim_lane_use,percent_of_limit,checksum,build_seconds,bytes,peer_mode,peer_description,quoted,ties,differences,ours_over_peer,\
-    command,seconds";
+    efficiency,command,seconds";
 
 /// The file: a header line and one line per row, RFC 4180 quoting, lines end in LF.
 pub fn csv(run: &Run, rows: &[Row]) -> String {
@@ -146,7 +150,7 @@ pub fn csv(run: &Run, rows: &[Row]) -> String {
 fn line(run: &Run, row: &Row) -> String {
     let scene = &row.scene;
     let mut cells: Vec<String> = [run.revision, &run.date, &run.cpu, run.isa, env::FLAGS].map(String::from).into();
-    cells.extend([run.threads.to_string(), scene.name.clone(), scene.hash.clone(), scene.prims.to_string()]);
+    cells.extend([row.threads.to_string(), scene.name.clone(), scene.hash.clone(), scene.prims.to_string()]);
     cells.extend([row.class, row.query, row.engine, row.precision].map(String::from));
     cells.push(row.rays.to_string());
     let optional = |x: &Option<f64>| x.map_or(String::new(), |x| format!("{x:.4}"));
@@ -178,6 +182,7 @@ fn line(run: &Run, row: &Row) -> String {
     }));
     cells.extend([row.ties, row.differences].map(|n| n.to_string()));
     cells.push(peer.map_or(String::new(), |peer| optional(&peer.lead)));
+    cells.push(optional(&row.efficiency));
     cells.push(run.command.clone());
     cells.push(match &row.outcome {
         Outcome::Timed { passes, .. } => passes.iter().map(|s| format!("{s:.9}")).collect::<Vec<_>>().join(" "),
@@ -290,9 +295,11 @@ mod tests {
             query: "closest",
             engine: "packet4",
             precision: "f32",
+            threads: 2,
             rays: 2_000_000,
             ties: 5,
             differences: 1,
+            efficiency: Some(0.9),
             peer: None,
             outcome,
         }
@@ -314,7 +321,7 @@ mod tests {
 
     fn run() -> Run {
         let (date, cpu, command) = ["2026-01-31T00:00:00Z", "CPU", "lanecast bench"].map(String::from).into();
-        Run { date, revision: "0123456789ab", isa: "avx2", cpu, threads: 2, command }
+        Run { date, revision: "0123456789ab", isa: "avx2", cpu, threads: 4, command }
     }
 
     /// Reads a CSV line by the rules of RFC 4180.
@@ -353,6 +360,7 @@ mod tests {
         assert_eq!(cell(1, "spread"), "0.5000");
         assert_eq!(cell(1, "ratio_to_scalar"), "2.0000");
         assert_eq!(cell(1, "percent_of_limit"), "12.5000");
+        assert_eq!((cell(1, "threads"), cell(1, "efficiency")), ("2".into(), "0.9000".into()));
         assert_eq!(cell(1, "checksum"), "0000000000000abc");
         assert_eq!(cell(1, "seconds"), "1.000000000 0.500000000 1.000000000");
         assert_eq!(cell(2, "status"), "skipped: too, many");
@@ -382,6 +390,6 @@ mod tests {
         assert_eq!(text.lines().count(), 3, "{text}");
         assert!(text.contains("embree [16 coherent]") && text.contains("1.50x       5      1"), "{text}");
         let csv = csv(&run(), &rows);
-        assert!(csv.contains(",8 coherent,,false,5,1,1.5000,") && csv.contains(",16 coherent,,true,"), "{csv}");
+        assert!(csv.contains(",8 coherent,,false,5,1,1.5000,0.9000,") && csv.contains(",16 coherent,,true,"), "{csv}");
     }
 }

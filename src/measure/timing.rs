@@ -31,6 +31,7 @@ pub struct Workers {
     pool: rayon::ThreadPool,
     scratches: Vec<Mutex<Scratch>>,
     flushing: bool,
+    fewer: Vec<Workers>,
 }
 
 impl Workers {
@@ -55,7 +56,7 @@ impl Workers {
             .build()
             .map_err(|e| Error::Usage(format!("cannot start {threads} threads: {e}")))?;
         let scratches = (0..pool.current_num_threads()).map(|_| Mutex::default()).collect();
-        Ok(Self { pool, scratches, flushing: false })
+        Ok(Self { pool, scratches, flushing: false, fewer: Vec::new() })
     }
 
     /// Whether denormal numbers count as zero during passes, of engines and peers alike: what peers ask for.
@@ -63,6 +64,21 @@ impl Workers {
     pub fn flushing(mut self, on: bool) -> Self {
         self.flushing = on;
         self
+    }
+
+    /// With teams of 1, 2, 4, ... of these threads' cores beside them, to see what each thread adds.
+    ///
+    /// # Errors
+    /// A usage error if the system refuses the threads.
+    pub fn with_fewer(mut self) -> Result<Self> {
+        let counts = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|&n| n < self.threads());
+        self.fewer = counts.map(|n| Ok(Self::new(n)?.flushing(self.flushing))).collect::<Result<_>>()?;
+        Ok(self)
+    }
+
+    /// See [`Workers::with_fewer`].
+    pub fn fewer(&self) -> &[Self] {
+        &self.fewer
     }
 
     /// Number of threads.
@@ -242,6 +258,8 @@ impl<S: Real> Tracer<'_, S> {
 
 /// One tracer on one list of batches, with what its passes took.
 pub struct Series<'a, S> {
+    /// On which threads.
+    pub workers: &'a Workers,
     /// Who traces.
     pub tracer: Tracer<'a, S>,
     /// Answers of the last pass.
@@ -252,8 +270,8 @@ pub struct Series<'a, S> {
 
 impl<'a, S: Real> Series<'a, S> {
     /// A series without passes, holding the answers that were checked.
-    pub fn new(tracer: Tracer<'a, S>, answers: Answers<S>) -> Self {
-        Self { tracer, answers, seconds: Vec::new() }
+    pub fn new(workers: &'a Workers, tracer: Tracer<'a, S>, answers: Answers<S>) -> Self {
+        Self { workers, tracer, answers, seconds: Vec::new() }
     }
 }
 
@@ -263,7 +281,6 @@ impl<'a, S: Real> Series<'a, S> {
 /// # Errors
 /// [`Error::Interrupted`] when `stop` says so.
 pub fn interleave<S: Real>(
-    workers: &Workers,
     world: &World<S>,
     load: Load<'_, S>,
     series: &mut [Series<'_, S>],
@@ -275,7 +292,7 @@ pub fn interleave<S: Real>(
             if stop() {
                 return Err(Error::Interrupted);
             }
-            let seconds = one.tracer.pass(workers, world, load, &mut one.answers);
+            let seconds = one.tracer.pass(one.workers, world, load, &mut one.answers);
             if round >= warm_up {
                 one.seconds.push(seconds);
             }
@@ -316,8 +333,9 @@ mod tests {
         let engines = [Slab::named("A", &order), Slab::named("B", &order)];
         let workers = Workers::new(1).unwrap();
         let empty = Answers::new(Query::Closest, &batches);
-        let mut series: Vec<_> = engines.iter().map(|e| Series::new(Tracer::Engine(e), empty.clone())).collect();
-        interleave(&workers, &world, Load::packed(&batches), &mut series, (1, 3), &|| false).unwrap();
+        let of = engines.iter().map(|e| Series::new(&workers, Tracer::Engine(e), empty.clone()));
+        let mut series: Vec<_> = of.collect();
+        interleave(&world, Load::packed(&batches), &mut series, (1, 3), &|| false).unwrap();
         assert_eq!(series.iter().map(|s| s.seconds.len()).collect::<Vec<_>>(), [3, 3]);
         drop(series);
         assert_eq!(order.lock().unwrap().as_str(), "ABABABAB");
@@ -326,11 +344,11 @@ mod tests {
     #[test]
     fn stops_before_the_next_pass() {
         let (world, batches) = (empty_world::<f64>(), falling_rays::<f64>(&[16]));
-        let engine = Slab::default();
-        let mut series = [Series::new(Tracer::Engine(&engine), Answers::new(Query::Any, &batches))];
+        let (engine, workers) = (Slab::default(), Workers::new(1).unwrap());
+        let mut series = [Series::new(&workers, Tracer::Engine(&engine), Answers::new(Query::Any, &batches))];
         let asked = AtomicU32::new(0);
         let stop = || asked.fetch_add(1, Ordering::Relaxed) == 2;
-        let result = interleave(&Workers::new(1).unwrap(), &world, Load::packed(&batches), &mut series, (0, 10), &stop);
+        let result = interleave(&world, Load::packed(&batches), &mut series, (0, 10), &stop);
         assert!(matches!(result, Err(Error::Interrupted)));
         assert_eq!(series[0].seconds.len(), 2);
     }
@@ -341,6 +359,15 @@ mod tests {
         let workers = Workers::new(1).unwrap();
         assert_eq!(workers.count(&Slab::default(), &world, &batches, Query::Closest).rays, 107);
         assert_eq!(workers.count(&Slab::default(), &world, &batches, Query::Any).rays, 107);
+    }
+
+    #[test]
+    fn teams_of_fewer_threads_are_powers_of_two() {
+        for (threads, fewer) in [(1, vec![]), (2, vec![1]), (3, vec![1, 2]), (4, vec![1, 2]), (5, vec![1, 2, 4])] {
+            let workers = Workers::new(threads).unwrap().flushing(true).with_fewer().unwrap();
+            assert_eq!(workers.fewer().iter().map(Workers::threads).collect::<Vec<_>>(), fewer);
+            assert!(workers.fewer().iter().all(|team| team.flushing));
+        }
     }
 
     #[test]

@@ -28,9 +28,11 @@ fn row(scene: &str, prims: u64, engine: &'static str, seconds: f64) -> Row {
         query: "closest",
         engine,
         precision: "f32",
+        threads: 1,
         rays: 1000,
         ties: 1,
         differences: 0,
+        efficiency: None,
         peer: None,
         outcome,
     }
@@ -41,7 +43,8 @@ fn run(folder: &Path, revision: &'static str, threads: usize, rows: &[Row]) {
     let (date, cpu) = (format!("2026-01-0{threads}T00:00:00Z"), "A <fast> CPU".to_string());
     let command = format!("lanecast bench 'a & b.ply' --threads {threads}");
     let run = Run { date, revision, isa: "avx2", cpu, threads, command };
-    std::fs::write(folder.join("bench.csv"), rows::csv(&run, rows)).unwrap();
+    let rows: Vec<Row> = rows.iter().map(|row| Row { threads, ..row.clone() }).collect();
+    std::fs::write(folder.join("bench.csv"), rows::csv(&run, &rows)).unwrap();
     std::fs::write(folder.join("bench.env.txt"), "cpu: A <fast> CPU\nrustc: rustc 1\nload average: 1 2 3\n").unwrap();
 }
 
