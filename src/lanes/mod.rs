@@ -22,6 +22,7 @@ mod moved;
 mod pages;
 mod pair;
 pub mod past;
+pub mod rows;
 mod scalar;
 pub mod space;
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
@@ -184,6 +185,11 @@ pub trait Real:
     fn next_down(self) -> Self;
     /// The smallest number above a finite `self`.
     fn next_up(self) -> Self;
+    /// Rows and columns swapped.
+    #[inline(always)]
+    fn transposed(block: &[[Self; rows::ROW]; rows::ROW]) -> [[Self; rows::ROW]; rows::ROW] {
+        rows::transposed(block)
+    }
 }
 
 /// Three vectors: x, y and z of `N` points or directions.

@@ -1,6 +1,6 @@
 //! Width 1: the scalars themselves.
 
-use super::{LaneMask, Lanes, Real};
+use super::{LaneMask, Lanes, Real, rows};
 
 impl LaneMask for bool {
     #[inline(always)]
@@ -18,7 +18,7 @@ impl LaneMask for bool {
 }
 
 macro_rules! scalar_lanes {
-    ($t:ident, $octo:ident, $wide:ident, $children:ident) => {
+    ($t:ident, $octo:ident, $wide:ident, $children:ident $(, $transposed:path)?) => {
         impl Lanes for $t {
             type Scalar = $t;
             type Mask = bool;
@@ -113,12 +113,18 @@ macro_rules! scalar_lanes {
             fn next_up(self) -> Self {
                 $t::next_up(self)
             }
+            $(
+                #[inline(always)]
+                fn transposed(block: &[[Self; rows::ROW]; rows::ROW]) -> [[Self; rows::ROW]; rows::ROW] {
+                    $transposed(block)
+                }
+            )?
         }
     };
 }
 
 #[cfg(target_feature = "avx512f")]
-scalar_lanes!(f32, f32x8, f32x16, f32x16);
+scalar_lanes!(f32, f32x8, f32x16, f32x16, rows::transposed_floats);
 #[cfg(not(target_feature = "avx512f"))]
-scalar_lanes!(f32, f32x8, f32x16, f32x8);
+scalar_lanes!(f32, f32x8, f32x16, f32x8, rows::transposed_floats);
 scalar_lanes!(f64, f64x8, f64x8, f64x8);

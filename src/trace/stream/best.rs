@@ -93,12 +93,12 @@ impl<S: Real> Best<S> {
 
     /// Writes the hits to their places in a batch.
     #[inline(always)]
-    pub fn scatter(&self, hits: &mut Hits<S>, ids: &[u32]) {
+    pub fn scatter(&self, hits: &mut Hits<S>, places: &[u32], id: impl Fn(u32) -> usize) {
         let n = hits.t.len();
         let (t, u, v) = (&mut hits.t[..n], &mut hits.u[..n], &mut hits.v[..n]);
         let (prim, inst) = (&mut hits.prim[..n], &mut hits.inst[..n]);
-        for (i, &id) in ids.iter().enumerate().take(RAYS) {
-            let id = (id as usize).min(n - 1);
+        for (i, &place) in places.iter().enumerate().take(RAYS) {
+            let id = id(place).min(n - 1);
             t[id] = if self.prim[i] == INVALID_ID { S::INFINITY } else { self.t[i] };
             (u[id], v[id], prim[id], inst[id]) = (self.u[i], self.v[i], self.prim[i], self.inst[i]);
         }
@@ -106,12 +106,12 @@ impl<S: Real> Best<S> {
 
     /// Writes what any-hit found where it found something.
     #[inline(always)]
-    pub fn scatter_done(&self, out: &mut [u8], ids: &[u32]) {
+    pub fn scatter_done(&self, out: &mut [u8], places: &[u32], id: impl Fn(u32) -> usize) {
         let mut rest = self.done;
         while rest != 0 {
             let i = rest.trailing_zeros() as usize;
             rest &= rest - 1;
-            out[ids[i] as usize] = 1;
+            out[id(places[i])] = 1;
         }
     }
 }

@@ -2,10 +2,11 @@
 
 use super::bounds::Bounds;
 use super::node::DENSE;
+use crate::lanes::rows::{ROW, Row, from_rows};
 use crate::lanes::words::transpose_bits;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, map3};
+use crate::ray::Packet;
 use crate::ray::slab::Interval;
-use crate::ray::{Packet, Rays};
 use crate::scene::world::Instance;
 use crate::shape::{Triangle, Turned, around};
 
@@ -81,6 +82,13 @@ impl<S: Real> Default for Chunk<S> {
     }
 }
 
+/// What a chunk takes of the rays of a packet, as columns.
+#[inline(always)]
+pub fn row<V: Lanes>(packet: &Packet<V>, t_max: V) -> [V; ROW] {
+    let ([ox, oy, oz], [dx, dy, dz]) = (packet.org, packet.dir);
+    [ox, oy, oz, packet.t_min, dx, dy, dz, t_max]
+}
+
 #[inline(always)]
 fn load3<V: Lanes>(from: &[[V::Scalar; RAYS]; 3], at: usize) -> Lanes3<V> {
     [V::load(&from[0][at..]), V::load(&from[1][at..]), V::load(&from[2][at..])]
@@ -92,32 +100,23 @@ fn store3<V: Lanes>(from: Lanes3<V>, to: &mut [[V::Scalar; RAYS]; 3], at: usize)
 }
 
 impl<S: Real> Chunk<S> {
-    /// Takes at most [`RAYS`] rays from a batch, which is not empty; the ends of their segments go to `t`. `ANY`: for any-hit.
+    /// Takes at most [`RAYS`] rays by their places among `rows` (see [`row`]), which are some; the ends of their segments go to `t`.
+    /// `ANY`: for any-hit.
     #[inline(always)]
-    pub fn gather<V: Lanes<Scalar = S>, const ANY: bool>(&mut self, rays: &Rays<S>, ids: &[u32], t: &mut [S; RAYS]) {
-        self.start(ids.len());
-        // Columns of one known length, so that a ray's number is looked at once instead of eight times.
-        let n = rays.padded_len();
-        let [ox, oy, oz] = each(|a| &rays.org[a][..n]);
-        let [dx, dy, dz] = each(|a| &rays.dir[a][..n]);
-        let (t_min, t_max) = (&rays.t_min[..n], &rays.t_max[..n]);
-        for (i, &id) in ids.iter().enumerate().take(RAYS) {
-            let id = (id as usize).min(n - 1);
-            (self.org[0][i], self.org[1][i], self.org[2][i]) = (ox[id], oy[id], oz[id]);
-            (self.dir[0][i], self.dir[1][i], self.dir[2][i]) = (dx[id], dy[id], dz[id]);
-            (self.t_min[i], t[i]) = (t_min[id], t_max[id]);
-        }
-        // Whole vectors.
+    pub fn gather<V: Lanes<Scalar = S>, const ANY: bool>(
+        &mut self,
+        rows: &[Row<S>],
+        places: &[u32],
+        t: &mut [S; RAYS],
+    ) {
+        self.start(places.len());
         let last = self.len - 1;
-        for i in self.len..self.len.next_multiple_of(V::N).min(RAYS) {
-            for axis in 0..3 {
-                (self.org[axis][i], self.dir[axis][i]) = (self.org[axis][last], self.dir[axis][last]);
-            }
-            (self.t_min[i], t[i]) = (self.t_min[last], t[last]);
-        }
         for at in (0..self.len).step_by(V::N) {
-            let (org, dir) = (load3::<V>(&self.org, at), load3::<V>(&self.dir, at));
-            self.put(at, &Packet::new(org, dir, V::load(&self.t_min[at..])));
+            // Whole vectors: the last ray again.
+            let row = |i: usize| rows[(places[(at + i).min(last)] as usize).min(rows.len() - 1)];
+            let [ox, oy, oz, t_min, dx, dy, dz, t_max] = from_rows::<V>(row);
+            t_max.store(&mut t[at..]);
+            self.take(at, &Packet::new([ox, oy, oz], [dx, dy, dz], t_min));
         }
         self.bounds = Some(Bounds::of::<V>(self, t));
         if !ANY && self.len >= DENSE as usize {

@@ -27,6 +27,7 @@ use std::marker::PhantomData;
 use super::output::Output;
 use super::query::{Query, Stack};
 use super::{Engine, Engines, Scratch, traverse};
+use crate::lanes::rows::{Row, to_rows};
 use crate::lanes::words::{prefetch, transpose_bits};
 use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
@@ -54,10 +55,14 @@ const KEYS: usize = 4 * OCTANTS;
 /// Working memory of the engine.
 #[derive(Clone, Debug)]
 pub struct Memory<S> {
-    /// Numbers of the rays of each octant along each dominant axis: octants along x, then along y, then along z.
+    /// The vectors that are sorted, ray by ray: a ray moves as one row instead of eight numbers from eight columns.
+    rows: Vec<Row<S>>,
+    /// Where each of them starts in the batch.
+    starts: Vec<u32>,
+    /// Places among `rows` of the rays of each octant along each dominant axis: octants along x, then along y, then along z.
     bins: [Vec<u32>; KEYS],
     /// Those of one octant, along x, then y, then z.
-    ids: Vec<u32>,
+    places: Vec<u32>,
     chunk: Chunk<S>,
     /// The chunk in an instance's space.
     local: Chunk<S>,
@@ -70,8 +75,10 @@ pub struct Memory<S> {
 impl<S: Real> Default for Memory<S> {
     fn default() -> Self {
         Self {
+            rows: Vec::new(),
+            starts: Vec::new(),
             bins: Default::default(),
-            ids: Vec::new(),
+            places: Vec::new(),
             chunk: Chunk::default(),
             local: Chunk::default(),
             best: Best::default(),
@@ -217,13 +224,20 @@ impl<S: Real> Job<'_, S> {
             Output::Closest(_) => {}
             Output::Any(out) => out.iter_mut().skip(at).take(V::N).for_each(|out| *out = 0),
         }
+        let Memory { rows, starts, bins, .. } = &mut *self.memory;
+        let first = starts.len() * V::N;
+        if rows.len() < first + V::N {
+            rows.resize(first + SOURCE, Row::ZERO);
+        }
+        to_rows(chunk::row(packet, t_max), &mut rows[first..first + V::N]);
+        starts.push(at as u32);
         let keys = transpose_bits(Signs::of(packet).0);
         let mut rest = live;
         while rest != 0 {
             let lane = rest.trailing_zeros();
             rest &= rest - 1;
             let key = usize::from(keys[lane as usize % keys.len()]);
-            self.memory.bins[key % KEYS].push(at as u32 + lane);
+            bins[key % KEYS].push(first as u32 + lane);
         }
         live.count_ones() as usize
     }
@@ -264,25 +278,27 @@ impl<S: Real> Job<'_, S> {
     /// Traces what was sorted, chunk by chunk.
     #[inline(always)]
     fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
-        let Memory { bins, ids, chunk, local, best, waiting, closer, .. } = &mut *self.memory;
+        let Memory { rows, starts, bins, places, chunk, local, best, waiting, closer, .. } = &mut *self.memory;
+        let id = |place: u32| starts[place as usize / V::N] as usize + place as usize % V::N;
         for octant in 0..OCTANTS {
-            ids.clear();
-            bins[octant..].iter_mut().step_by(OCTANTS).for_each(|alike| ids.append(alike));
-            let mut rest = &ids[..];
+            places.clear();
+            bins[octant..].iter_mut().step_by(OCTANTS).for_each(|alike| places.append(alike));
+            let mut rest = &places[..];
             while !rest.is_empty() {
                 // Chunks of nearly equal sizes.
-                let (ids, others) = rest.split_at(rest.len().div_ceil(rest.len().div_ceil(RAYS)));
+                let (places, others) = rest.split_at(rest.len().div_ceil(rest.len().div_ceil(RAYS)));
                 rest = others;
-                chunk.gather::<V, ANY>(self.rays, ids, &mut best.t);
+                chunk.gather::<V, ANY>(rows, places, &mut best.t);
                 best.start();
                 let mut walk = walk::Walk::new(best, (waiting, closer), self.stack, self.counters);
                 walk.world::<V, ANY, COUNT>(self.world, chunk, local, octant);
                 match &mut self.output {
-                    Output::Closest(hits) => best.scatter(hits, ids),
-                    Output::Any(out) => best.scatter_done(out, ids),
+                    Output::Closest(hits) => best.scatter(hits, places, id),
+                    Output::Any(out) => best.scatter_done(out, places, id),
                 }
             }
         }
+        starts.clear();
     }
 }
 

@@ -201,11 +201,13 @@ fn dense<V: Lanes, const W: usize, const ANY: bool>(
 #[cfg(test)]
 mod tests {
     use super::super::OCTANTS;
+    use super::super::chunk::row;
     use super::*;
     use crate::bvh::{Child, WIDE, WIDTH};
+    use crate::lanes::rows::{Row, to_rows};
     use crate::lanes::{f32x8, f32x16, f64x8};
     use crate::math::Aabb;
-    use crate::ray::Rays;
+    use crate::ray::{Packet, Rays};
 
     /// Rays of one octant near boxes, some far from the origin, some nearly along an axis.
     fn check<V: Lanes, E: Lanes<Scalar = V::Scalar>, const W: usize>() {
@@ -234,9 +236,13 @@ mod tests {
                 let bounds = Aabb { lo, hi: each(|a| lo[a] + V::Scalar::from_f64(2.0 * next())) };
                 node.push(&bounds, Child::ROOT);
             }
-            let ids: Vec<u32> = (0..RAYS as u32).collect();
+            let (mut rows, places) = (vec![Row::ZERO; RAYS], (0..RAYS as u32).collect::<Vec<_>>());
+            for at in (0..RAYS).step_by(V::N) {
+                let (packet, t_max, _) = Packet::<V>::load(&rays, at);
+                to_rows(row(&packet, t_max), &mut rows[at..]);
+            }
             let (mut chunk, mut t) = (Chunk::default(), [V::Scalar::ZERO; RAYS]);
-            chunk.gather::<V, false>(&rays, &ids, &mut t);
+            chunk.gather::<V, false>(&rows, &places, &mut t);
             steep += u32::from(chunk.steep);
             // A direction of zero points up, whatever the octant.
             let (mut rest, mut of_octant) = (Set::MAX, 0);
