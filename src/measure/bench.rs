@@ -96,9 +96,19 @@ pub fn scene<S: Engines>(
     Ok(())
 }
 
-/// The engines called `names`, or all of precision `S`.
+/// The engines called `names`, each once (`auto` is another name of one), or all of precision `S`.
 fn chosen<S: Engines>(names: &[String]) -> Result<Vec<&'static dyn Engine<S>>> {
-    if names.is_empty() { Ok(S::engines().to_vec()) } else { names.iter().map(|name| engine(name)).collect() }
+    if names.is_empty() {
+        return Ok(S::engines().to_vec());
+    }
+    let mut engines: Vec<&'static dyn Engine<S>> = Vec::new();
+    for name in names {
+        let next = engine::<S>(name)?;
+        if engines.iter().all(|engine| engine.name() != next.name()) {
+            engines.push(next);
+        }
+    }
+    Ok(engines)
 }
 
 struct Subject<'a, S: 'static> {

@@ -177,7 +177,8 @@ impl Workers {
         if self.threads() == 1 {
             jobs.iter_mut().for_each(one);
         } else {
-            jobs.par_iter_mut().for_each(one);
+            // One by one: pieces as large as rayon would make them end far apart where a picture is sky here and leaves there.
+            jobs.par_iter_mut().with_max_len(1).for_each(one);
         }
         start.elapsed().as_secs_f64()
     }
@@ -359,6 +360,22 @@ mod tests {
         let workers = Workers::new(1).unwrap();
         assert_eq!(workers.count(&Slab::default(), &world, &batches, Query::Closest).rays, 107);
         assert_eq!(workers.count(&Slab::default(), &world, &batches, Query::Any).rays, 107);
+    }
+
+    /// All the work lies at the end of the list.
+    #[test]
+    fn threads_share_jobs_of_unequal_length() {
+        let (workers, slow) = (Workers::new(2).unwrap(), [AtomicU32::new(0), AtomicU32::new(0)]);
+        workers.install(|| {
+            workers.timed((0..32).collect(), |job, _| {
+                if *job >= 24 {
+                    slow[rayon::current_thread_index().unwrap()].fetch_add(1, Ordering::Relaxed);
+                    std::thread::sleep(std::time::Duration::from_millis(20));
+                }
+            })
+        });
+        let [one, other] = slow.map(AtomicU32::into_inner);
+        assert!(one + other == 8 && one.min(other) >= 3, "{one} and {other}");
     }
 
     #[test]
