@@ -180,7 +180,7 @@ fn two_runs_are_compared() {
     run(&dir, &format!("{bench} old"));
     run(&dir, &format!("{bench} new"));
     let text = run(&dir, "bench --compare old new/bench.csv").out;
-    assert!(text.contains("square") && text.contains("packet4") && text.contains("scalar"), "{text}");
+    assert!(text.contains("square") && text.contains("tile") && text.contains("scalar"), "{text}");
     let same = run(&dir, "bench --compare old old --json").json();
     let rows = same.as_array().expect("rows");
     assert_eq!(rows.len(), 2);
