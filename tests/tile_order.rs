@@ -61,6 +61,7 @@ fn another_tree_gives_the_same_bits() {
         ("soup", vec![soup(6000, &mut r)]),
         ("every triangle twice", vec![twice.clone(), twice]),
         ("fine ball", vec![fine]),
+        ("much finer ball", vec![ball(300, 400)]),
         ("room", room),
     ] {
         let worlds = worlds(&meshes);
@@ -89,4 +90,24 @@ fn another_tree_gives_the_same_bits() {
         assert!(hits > 50_000, "{name}: {hits}");
         assert_eq!(differ, [0, 0], "{name}");
     }
+}
+
+/// Where triangles are much smaller than the distance of rays, tiles leave their rays to the stream kernel, whose bits are the
+/// common formula's; where they are not, the tile's own arithmetic shows.
+#[test]
+fn tiles_leave_triangles_that_their_rays_do_not_share() {
+    let [world, ..] = worlds(&[ball(400, 500)]);
+    let differ = |distance: f64| {
+        let rays = camera(DVec3::new(0.0, 0.3, distance), DVec3::ZERO, 0.5, 96);
+        let (mut hits, mut common, mut scratch) = (Hits::default(), Hits::default(), Scratch::default());
+        find("tile").intersect(&world, &rays, &mut hits, &mut scratch, None);
+        find("scalar").intersect(&world, &rays, &mut common, &mut scratch, None);
+        let differ = (0..rays.len()).filter(|&i| hits.t[i].to_bits() != common.t[i].to_bits()).count();
+        (differ, (0..rays.len()).filter(|&i| common.prim[i] != u32::MAX).count())
+    };
+    let (far, near) = (differ(8.0), differ(2.5));
+    println!("other t, of hits: {far:?} far away, {near:?} nearby");
+    assert!(far.1 > 400 && near.1 > 4000, "{far:?} {near:?}");
+    assert_eq!(far.0, 0);
+    assert!(near.0 > near.1 / 10, "{near:?}");
 }

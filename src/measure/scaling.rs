@@ -29,12 +29,13 @@ pub fn table(rows: &[Row]) -> String {
         let _infallible = write!(text, "  {:<8} {:<width$}", last.class, last.engine);
         for &threads in &counts {
             let row = rows.iter().find(|row| row.threads == threads && row.efficiency.is_some() && same(row, last));
-            let (rate, efficiency) = match row.map(|row| (row, &row.outcome)) {
-                Some((row, Outcome::Timed { seconds, .. })) => (row.mrays(seconds.median), row.efficiency),
-                _ => (f64::NAN, None),
+            let (rate, each) = match row.map(|row| (row, &row.outcome, row.efficiency)) {
+                Some((row, Outcome::Timed { seconds, .. }, Some(each))) => {
+                    (format!("{:.2}", row.mrays(seconds.median)), format!("{:.0}%", 100.0 * each))
+                }
+                _ => ("-".into(), "-".into()),
             };
-            let each = efficiency.map_or("-".into(), |x| format!("{:.0}%", 100.0 * x));
-            let _infallible = write!(text, " {rate:>9.2} {each:>7}");
+            let _infallible = write!(text, " {rate:>9} {each:>7}");
         }
         text.push('\n');
     }
@@ -87,6 +88,8 @@ mod tests {
             row("tile", 2, 0.5, Some(0.75)),
             row("scalar", 1, 3.0, Some(1.0)),
             row("tile", 1, 0.75, Some(1.0)),
+            row("stream", 2, 1.0, Some(1.0)),
+            Row { outcome: Outcome::Wrong { unexplained: 1, examples: Vec::new() }, ..row("stream", 1, 0.0, None) },
             row("embree", 2, 1.0, None),
         ];
         let text = table(&rows);
@@ -95,7 +98,8 @@ mod tests {
         assert_eq!(lines[1], ["rays", "engine", "1", "each", "2", "each"]);
         assert_eq!(lines[2], ["primary", "scalar", "1.00", "100%", "2.00", "100%"]);
         assert_eq!(lines[3], ["primary", "tile", "4.00", "100%", "6.00", "75%"]);
-        assert_eq!(lines.len(), 5, "{text}");
+        assert_eq!(lines[4], ["primary", "stream", "-", "-", "3.00", "100%"]);
+        assert_eq!(lines.len(), 6, "{text}");
         assert_eq!(table(&[row("tile", 2, 0.5, None)]), "");
     }
 }

@@ -152,24 +152,34 @@ impl<S: Real> World<S> {
     /// A hit on a triangle whose mesh has no shading normals, for those who compute the rest themselves.
     #[inline]
     pub fn bare_triangle(&self, prim: u32, inst: u32) -> Bare {
+        let run = self.runs[self.assembly.placements[inst as usize].object as usize].of(prim);
+        let plain = |mesh: &Mesh| mesh.normals.values.is_empty();
+        Bare { material: run.material, triangle: self.triangle_if(prim, inst, plain) }
+    }
+
+    /// First corner of a triangle and the edges from it to the second and the third, world space; `None` if `prim` is something
+    /// else.
+    pub fn triangle(&self, prim: u32, inst: u32) -> Option<[DVec3; 3]> {
+        self.triangle_if(prim, inst, |_| true)
+    }
+
+    /// [`Self::triangle`], if its mesh is `wanted`.
+    #[inline(always)]
+    fn triangle_if(&self, prim: u32, inst: u32, wanted: impl Fn(&Mesh) -> bool) -> Option<[DVec3; 3]> {
         let placement = &self.assembly.placements[inst as usize];
         let run = self.runs[placement.object as usize].of(prim);
         let part = &self.assembly.objects[placement.object as usize].parts[run.part as usize];
-        let triangle = match &part.kind {
-            PartKind::Mesh(mesh) if mesh.normals.values.is_empty() => {
-                let [a, b, c] = mesh.corners((prim - part.first_prim) as usize);
-                let (e1, e2) = (b - a, c - a);
-                let is_plain = self.instances[inst as usize].identity && part.to_object == DAffine3::IDENTITY;
-                Some(if is_plain {
-                    [a, e1, e2]
-                } else {
-                    let m = placement.to_world * part.to_object;
-                    [m.transform_point3(a), m.transform_vector3(e1), m.transform_vector3(e2)]
-                })
-            }
-            _ => None,
-        };
-        Bare { material: run.material, triangle }
+        let PartKind::Mesh(mesh) = &part.kind else { return None };
+        if !wanted(mesh) {
+            return None;
+        }
+        let [a, b, c] = mesh.corners((prim - part.first_prim) as usize);
+        let (e1, e2) = (b - a, c - a);
+        if self.instances[inst as usize].identity && part.to_object == DAffine3::IDENTITY {
+            return Some([a, e1, e2]);
+        }
+        let m = placement.to_world * part.to_object;
+        Some([m.transform_point3(a), m.transform_vector3(e1), m.transform_vector3(e2)])
     }
 }
 

@@ -1,6 +1,7 @@
 //! The engine as others see it.
 
-use super::{BLOCK, Job, Tile};
+use super::bundle::Bundle;
+use super::{BLOCK, GROUPS, Job, SET, SETS, Tile, suits};
 use crate::lanes::past::arrived;
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, Hits, Pencil, Rays};
@@ -67,6 +68,27 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
         out.clear();
         out.resize(rays.len(), 0);
         call::<true, EXACT>(world, rays, Output::Any(out), scratch, counters, self.most);
+    }
+}
+
+impl Job<'_> {
+    /// Traces a pencil as one tile; false if that cannot be.
+    fn pencil<const EXACT: bool, const COUNT: bool>(&mut self, pencil: &Pencil) -> bool {
+        if EXACT || self.most != GROUPS || !suits(self.world, EXACT) {
+            return false;
+        }
+        let Some(mut bundle) = Bundle::of_pencil(pencil) else { return false };
+        self.make_levels();
+        self.memory.slabs.forget();
+        // Those without a live ray too: their misses are written.
+        let groups = u64::MAX >> (GROUPS - bundle.len);
+        let traced = match bundle.len <= SET {
+            true => self.tile::<1, false, EXACT, COUNT>(&mut bundle, groups),
+            false => self.tile::<SETS, false, EXACT, COUNT>(&mut bundle, groups),
+        };
+        let is_done = traced && self.memory.rest.is_empty();
+        self.memory.rest.clear();
+        is_done
     }
 }
 

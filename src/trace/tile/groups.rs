@@ -302,9 +302,15 @@ impl Groups {
         if depth * depth <= square || depth <= 0.0 {
             return f32::INFINITY;
         }
-        let [s, t] = self.bounds.map(|[lo, hi]| hi - lo);
         // Half of the square around the sphere around it: a guess.
-        2.0 * square / (depth * depth) * (N * SET * V::N) as f32 / (s * t)
+        2.0 * square / (depth * depth) / self.spacing::<N>()
+    }
+
+    /// What of the plane at depth 1 a ray of the tile has for itself.
+    #[inline(always)]
+    pub fn spacing<const N: usize>(&self) -> f32 {
+        let [s, t] = self.bounds.map(|[lo, hi]| hi - lo);
+        s * t / (N * SET * V::N) as f32
     }
 
     /// The smallest values of some linear functions over the tile's rectangle.

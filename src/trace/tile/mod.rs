@@ -7,8 +7,9 @@
 //! formula decides where rounding could matter, so its hits are those of the other engines, bit by bit ([`exact`]).
 //! Instances are entered by taking the tile's frame through their maps ([`place`]), or, where their triangles are finer than
 //! the rays, by the stream kernel ([`fine`]); shapes in them are tested ray by ray ([`shapes`]). To the stream kernel
-//! ([`super::stream`]) go blocks of rays without a common point, and worlds with solids, with more shapes than triangles,
-//! or with maps too flat for f32; for `tile-exact` also all worlds with instances. Single odd rays go to the packet kernel.
+//! ([`super::stream`]) go blocks of rays without a common point, tiles whose rays are farther apart than triangles ([`density`]),
+//! and worlds with solids, with more shapes than triangles, or with maps too flat for f32; for `tile-exact` also all worlds
+//! with instances. Single odd rays go to the packet kernel.
 //!
 //! Sources: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm", 2005; Wald, Boulos, Shirley, "Ray tracing
 //! deformable scenes using dynamic bounding volume hierarchies", 2007; Fuetterling, Lojewski, Pfreundt, Ebert,
@@ -17,6 +18,7 @@
 mod batch;
 mod bundle;
 mod columns;
+mod density;
 mod edges;
 mod engine;
 mod exact;
@@ -40,7 +42,7 @@ use super::output::Output;
 use super::query::{Query, Stack};
 use super::{Generic, Scratch, stream, traverse};
 use crate::lanes::{Lanes, f32x16};
-use crate::ray::{Counters, HitPacket, Packet, Pencil, Rays};
+use crate::ray::{Counters, HitPacket, Packet, Rays};
 use crate::scene::world::{Object, World};
 use bundle::{Bundle, Shared};
 use columns::{AHEAD, Next};
@@ -241,25 +243,6 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Traces a pencil as one tile; false if that cannot be.
-    fn pencil<const EXACT: bool, const COUNT: bool>(&mut self, pencil: &Pencil) -> bool {
-        if EXACT || self.most != GROUPS || !suits(self.world, EXACT) {
-            return false;
-        }
-        let Some(mut bundle) = Bundle::of_pencil(pencil) else { return false };
-        self.make_levels();
-        self.memory.slabs.forget();
-        // Those without a live ray too: their misses are written.
-        let groups = u64::MAX >> (GROUPS - bundle.len);
-        let traced = match bundle.len <= SET {
-            true => self.tile::<1, false, EXACT, COUNT>(&mut bundle, groups),
-            false => self.tile::<SETS, false, EXACT, COUNT>(&mut bundle, groups),
-        };
-        let is_done = traced && self.memory.rest.is_empty();
-        self.memory.rest.clear();
-        is_done
-    }
-
     fn make_levels(&mut self) {
         let below = self.world.objects.iter().map(|object| node::levels(&object.tree)).max().unwrap_or(0);
         let depth = node::levels(&self.world.top) + below + 1;
@@ -316,6 +299,11 @@ impl<'a> Job<'a> {
         }
         if !self.memory.groups.load::<N, ANY, EXACT>(bundle, groups, self.world) {
             return false;
+        }
+        if self.is_dense::<N>() {
+            // For the stream kernel.
+            self.memory.rest.extend(listing::groups(groups).map(|g| bundle.first + g * V::N));
+            return true;
         }
         let next = Next::of(self.rays, bundle.first + bundle.len * V::N);
         let exact = Exact { bundle, world: self.world, object: self.world.first_object(), next };

@@ -1,0 +1,61 @@
+//! Triangles so much smaller than the distance of a tile's rays that neighbours have few of them in common: such a tile would
+//! set up thousands of triangles that no ray meets, and single rays ([`super::super::stream`]) are the faster way.
+//!
+//! What decides is the triangle that the ray in the middle of the tile meets, so that the same rays get the same bits whatever
+//! tree their world has and whatever was traced before.
+
+use std::f32::consts::PI;
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::Job;
+use crate::ray::{Counters, HitPacket, INVALID_ID, Packet};
+use crate::trace::query::Query;
+use crate::trace::traverse;
+
+/// Triangles per ray from which on tiles are the slower way.
+const DENSE: f64 = 24.0;
+
+/// Triangles per ray, if they were spread evenly over the directions, up to which nobody looks: the ray in the middle costs
+/// what a few triangles for a whole tile cost.
+const SPREAD: f32 = 2.0;
+
+impl Job<'_> {
+    /// Whether the loaded tile of `N` sets sees such triangles.
+    #[inline(always)]
+    pub(super) fn is_dense<const N: usize>(&mut self) -> bool {
+        let (groups, world) = (&self.memory.groups, self.world);
+        // Of instances each is looked at by itself ([`super::walk`]), and rays behind a mirror are rarely a whole tile.
+        if groups.many || groups.is_behind {
+            return false;
+        }
+        let count = world.assembly.objects[world.instances[0].object as usize].prim_count as f32;
+        let around = 4.0 * PI / groups.spacing::<N>();
+        count > SPREAD * around.min(groups.rays_on::<N>(&world.first_object().tree.bounds)) && self.met::<N>()
+    }
+
+    /// Looks at what the ray in the middle meets.
+    #[cold]
+    #[inline(never)]
+    fn met<const N: usize>(&mut self) -> bool {
+        let groups = &self.memory.groups;
+        let middle = groups.bounds.map(|[low, high]| 0.5 * (f64::from(low) + f64::from(high)));
+        let [u, v, a] = groups.frame.axes.map(|axis| DVec3::from(axis.map(f64::from)));
+        let into = DMat3::from_cols(u, v, a).transpose();
+        let way = into.inverse() * DVec2::from(middle).extend(1.0);
+        let spacing = f64::from(groups.spacing::<N>());
+        let apex = groups.frame.apex;
+        let ray = Packet::<f32>::new(apex, way.normalize().as_vec3().to_array(), 0.0);
+        let counters = &mut Counters::default();
+        let mut query = Query::<f32, false, false>::new(HitPacket::new(f32::INFINITY), self.stack, counters);
+        traverse::world(self.world, &ray, &mut query, 1);
+        let (prim, inst) = (query.hit.prim[0], query.hit.inst[0]);
+        let triangle = if prim == INVALID_ID { None } else { self.world.triangle(prim, inst) };
+        let Some([first, e1, e2]) = triangle else { return false };
+        let from = first - DVec3::from(apex.map(f64::from));
+        let [p, q, r] = [from, from + e1, from + e2].map(|corner| into * corner);
+        let size =
+            0.5 * (q.truncate() / q.z - p.truncate() / p.z).perp_dot(r.truncate() / r.z - p.truncate() / p.z).abs();
+        p.z.min(q.z).min(r.z) > 0.0 && spacing > DENSE * size
+    }
+}
