@@ -32,7 +32,7 @@ pub fn tree<S, L, const ANY: bool, const COUNT: bool>(
     loop {
         // Down to a leaf, always into the nearest child.
         while !child.is_leaf() {
-            match nearest(&tree.nodes[child.index as usize], query, &bundle) {
+            match nearest(&tree.nodes[child.index as usize], query, &bundle, |child| leaves.fetch(&tree.nodes, child)) {
                 Some(nearest) => child = nearest,
                 None => break,
             }
@@ -63,6 +63,7 @@ fn nearest<S: Real, const ANY: bool, const COUNT: bool>(
     node: &Node<S>,
     query: &mut Query<S, ANY, COUNT>,
     bundle: &Bundle<S>,
+    fetch: impl Fn(Child),
 ) -> Option<Child> {
     query.count_node(1);
     let mut near = [S::ZERO; WIDTH];
@@ -75,18 +76,24 @@ fn nearest<S: Real, const ANY: bool, const COUNT: bool>(
         while met & (met - 1) != 0 {
             let slot = (31 - met.leading_zeros()) as usize & (WIDTH - 1);
             met &= !(1 << slot);
-            query.stack.waiting.push(Waiting { near: near[slot], child: node.child(slot) });
+            let child = node.child(slot);
+            fetch(child);
+            query.stack.waiting.push(Waiting { near: near[slot], child });
         }
-        return Some(node.child(met.trailing_zeros() as usize & (WIDTH - 1)));
+        let next = node.child(met.trailing_zeros() as usize & (WIDTH - 1));
+        fetch(next);
+        return Some(next);
     }
     let slot = met.trailing_zeros() as usize & (WIDTH - 1);
     met &= met - 1;
     let mut best = Waiting { near: near[slot], child: node.child(slot) };
+    fetch(best.child);
     let first = query.stack.waiting.len();
     while met != 0 {
         let slot = met.trailing_zeros() as usize & (WIDTH - 1);
         met &= met - 1;
         let other = Waiting { near: near[slot], child: node.child(slot) };
+        fetch(other.child);
         let nearer = other.near < best.near;
         let far = if nearer { best } else { other };
         best = if nearer { other } else { best };

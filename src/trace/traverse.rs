@@ -10,6 +10,7 @@ use super::query::Query;
 use super::single;
 use crate::bvh::Bundle;
 use crate::bvh::{Child, Node, Tree, WIDTH};
+use crate::lanes::words::prefetch_either;
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Packet;
 use crate::scene::world::{Object, World};
@@ -18,6 +19,8 @@ use crate::scene::world::{Object, World};
 pub trait Leaves<V: Lanes, const ANY: bool, const COUNT: bool> {
     /// Visits a leaf with some lanes.
     fn visit(&self, packet: &Packet<V>, query: &mut Query<V, ANY, COUNT>, leaf: Child, lanes: u32);
+    /// Asks the memory for one of `nodes` or for what a leaf refers to.
+    fn fetch(&self, nodes: &[Node<V::Scalar>], child: Child);
 }
 
 /// Leaves of an object's tree: blocks of primitives.
@@ -33,6 +36,11 @@ impl<V: Lanes, const ANY: bool, const COUNT: bool> Leaves<V, ANY, COUNT> for Obj
     fn visit(&self, packet: &Packet<V>, query: &mut Query<V, ANY, COUNT>, leaf: Child, lanes: u32) {
         leaf::block(self.object, self.inst, packet, query, leaf, lanes);
     }
+
+    #[inline(always)]
+    fn fetch(&self, nodes: &[Node<V::Scalar>], child: Child) {
+        prefetch_either(nodes, &self.object.triangles, child.is_leaf(), child.index as usize);
+    }
 }
 
 /// Leaves of the upper tree: instances.
@@ -41,6 +49,12 @@ pub struct TopLeaves<'a, S>(pub &'a World<S>);
 impl<V: Lanes, const ANY: bool, const COUNT: bool> Leaves<V, ANY, COUNT> for TopLeaves<'_, V::Scalar> {
     fn visit(&self, packet: &Packet<V>, query: &mut Query<V, ANY, COUNT>, leaf: Child, lanes: u32) {
         instance(self.0, self.0.top_leaves[leaf.index as usize], packet, query, lanes);
+    }
+
+    fn fetch(&self, nodes: &[Node<V::Scalar>], child: Child) {
+        let at = child.index as usize;
+        let inst = self.0.top_leaves[if child.is_leaf() { at } else { 0 }] as usize;
+        prefetch_either(nodes, &self.0.instances, child.is_leaf(), if child.is_leaf() { inst } else { at });
     }
 }
 
@@ -131,7 +145,9 @@ fn tree<V, L, const ANY: bool, const COUNT: bool>(
             }
             let node = &tree.nodes[child.index as usize];
             query.count_node(lanes);
-            (child, lanes) = children(node, packet, query, &bundle, lanes);
+            (child, lanes) = children(node, packet, query, &bundle, lanes, |child| {
+                Leaves::<V, ANY, COUNT>::fetch(leaves, &tree.nodes, child)
+            });
         }
     }
 }
@@ -162,6 +178,7 @@ fn children<V: Lanes, const ANY: bool, const COUNT: bool>(
     query: &mut Query<V, ANY, COUNT>,
     bundle: &Bundle<V::Scalar>,
     lanes: u32,
+    fetch: impl Fn(Child),
 ) -> (Child, u32) {
     // First the packet as a whole against all eight boxes. Where the first lane enters is near enough to go by.
     let mut keys = [V::Scalar::ZERO; WIDTH];
@@ -197,8 +214,10 @@ fn children<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
     for &slot in &order[..count - 1] {
         let slot = usize::from(slot);
+        fetch(node.child(slot));
         query.stack.push(node.child(slot), meets[slot], nears[slot]);
     }
     let slot = usize::from(order[count - 1]);
+    fetch(node.child(slot));
     (node.child(slot), meets[slot])
 }
