@@ -11,7 +11,7 @@ use super::cost::Cost;
 use super::node::LEAF_PRIMS;
 use super::refine::{Place, Refined};
 use super::topdown::{self, Part, Rules, Span};
-use crate::lanes::Real;
+use crate::lanes::{Real, with_large_pages};
 use crate::math::Aabb;
 
 /// A binary node: an inner node with two children or a leaf. Children follow their parents.
@@ -200,5 +200,7 @@ fn frame<S: Real>(boxes: &[Aabb<S>], prims: &[u32]) -> (Vec<Part>, f32) {
         Span::new(b.lo, b.hi)
     };
     let part = |&prim: &u32| Part { bounds: framed(&boxes[prim as usize]), prim };
-    (prims.par_iter().with_min_len(FRAMED).map(part).collect(), framed(&all).area())
+    let mut parts = with_large_pages(prims.len());
+    prims.par_iter().with_min_len(FRAMED).map(part).collect_into_vec(&mut parts);
+    (parts, framed(&all).area())
 }

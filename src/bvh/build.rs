@@ -3,7 +3,7 @@
 use super::binary::{self, Binary};
 use super::collapse::Plan;
 use super::node::{Child, LEAF_PRIMS, Node, WIDE, WIDTH};
-use crate::lanes::{Lanes, Real};
+use crate::lanes::{Lanes, Real, on_large_pages};
 use crate::math::Aabb;
 
 /// How much time a build may spend on the tree.
@@ -200,5 +200,6 @@ fn emit<S: Real, const W: usize>(
         }
         stack[first..].reverse();
     }
-    (nodes, depth)
+    // Rays jump about in it: with small pages every jump looks up an address as well.
+    (on_large_pages(nodes), depth)
 }

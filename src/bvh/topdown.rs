@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::cost::Cost;
-use crate::lanes::{Lanes, each, f32x8};
+use crate::lanes::{Lanes, each, f32x8, with_large_pages};
 
 /// Bins per axis, at most.
 const BINS: usize = 32;
@@ -97,7 +97,9 @@ pub struct Rules {
 /// number of threads.
 pub fn build(parts: &mut [Part], rules: Rules) -> Vec<Node> {
     let unused = Node { bounds: Span::EMPTY, count: 0, at: 0, leaf: true };
-    let mut nodes = vec![unused; (2 * parts.len()).saturating_sub(1)];
+    let len = (2 * parts.len()).saturating_sub(1);
+    let mut nodes = with_large_pages(len);
+    nodes.resize(len, unused);
     if !parts.is_empty() {
         grow(parts, &mut nodes, (0, 0), rules, 0);
     }

@@ -36,7 +36,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 pub use column::Column;
 pub use ftz::FlushDenormals;
 pub use isa::{compiled_features, compiled_isa};
-pub use pages::ask_for_large_pages;
+pub use pages::{ask_for_large_pages, on_large_pages, with_large_pages};
 pub use pair::Pair;
 
 /// Single-precision vectors by width.

@@ -12,6 +12,20 @@ pub fn ask_for_large_pages<T>(values: &[T]) {
     let _ = values;
 }
 
+/// Room for `len` elements, on large pages.
+pub fn with_large_pages<T>(len: usize) -> Vec<T> {
+    let mut room = Vec::with_capacity(len);
+    ask_for_large_pages(room.spare_capacity_mut());
+    room
+}
+
+/// `values`, whose number was not known beforehand, in as much room as they need, on large pages.
+pub fn on_large_pages<T: Copy>(values: Vec<T>) -> Vec<T> {
+    let mut list = with_large_pages(values.len());
+    list.extend_from_slice(&values);
+    list
+}
+
 #[cfg(target_os = "linux")]
 #[allow(unsafe_code, reason = "a system call that takes addresses")]
 mod linux {
@@ -47,6 +61,9 @@ mod tests {
             assert!(list.iter().all(|&x| x == 7));
             list.fill(9);
             assert!(list.iter().all(|&x| x == 9));
+            list[len / 2..].fill(5);
+            let moved = on_large_pages(list.clone());
+            assert_eq!((moved.capacity(), moved == list), (len, true));
         }
     }
 }

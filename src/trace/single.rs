@@ -80,22 +80,19 @@ fn nearest<S: Real, const ANY: bool, const COUNT: bool>(
             fetch(child);
             query.stack.waiting.push(Waiting { near: near[slot], child });
         }
-        let next = node.child(met.trailing_zeros() as usize & (WIDTH - 1));
-        fetch(next);
-        return Some(next);
+        return Some(node.child(met.trailing_zeros() as usize & (WIDTH - 1)));
     }
     let slot = met.trailing_zeros() as usize & (WIDTH - 1);
     met &= met - 1;
     let mut best = Waiting { near: near[slot], child: node.child(slot) };
-    fetch(best.child);
     let first = query.stack.waiting.len();
     while met != 0 {
         let slot = met.trailing_zeros() as usize & (WIDTH - 1);
         met &= met - 1;
         let other = Waiting { near: near[slot], child: node.child(slot) };
-        fetch(other.child);
         let nearer = other.near < best.near;
         let far = if nearer { best } else { other };
+        fetch(far.child);
         best = if nearer { other } else { best };
         // The nearest so far is in hand; the others are kept sorted, farthest first.
         let stack = &mut query.stack.waiting;

@@ -11,7 +11,7 @@ use super::runs::Runs;
 use super::{Class, Counts, Kinds, Object, PlacedSolid, SolidBlock, World, instances, solids, successor};
 use crate::bvh::{self, BuildSettings, LEAF_PRIMS, Leaf, Preset};
 use crate::error::Result;
-use crate::lanes::Real;
+use crate::lanes::{Real, with_large_pages};
 use crate::math::Aabb;
 use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind};
 use crate::scene::description::{Description, Shape};
@@ -222,7 +222,7 @@ impl<S: Real> Primitives<S> {
         let blocks = |class: Class| leaves.iter().filter(|leaf| leaf.class == class as u8).count();
         let mut object = Object {
             tree,
-            triangles: Vec::with_capacity(blocks(Class::Triangle)),
+            triangles: with_large_pages(blocks(Class::Triangle)),
             spheres: Vec::with_capacity(blocks(Class::WorldSphere)),
             placed: Default::default(),
             unbounded: Vec::new(),
