@@ -132,6 +132,8 @@ pub struct Job<'a, S> {
     pub counters: &'a mut Counters,
     /// Where answers go.
     pub output: Output<'a, S>,
+    /// Rays that point the same way are known to have few triangles in common all the same: none are traced as packets.
+    pub apart: bool,
 }
 
 impl<S: Real> Job<'_, S> {
@@ -201,7 +203,7 @@ impl<S: Real> Job<'_, S> {
         let columns = rays.org.iter().chain(&rays.dir).chain([&rays.t_min, &rays.t_max]);
         columns.for_each(|column| prefetch(column, at + AHEAD * V::N));
         let (packet, t_max, live) = self.load::<V, COUNT>(at);
-        if live != 0 && Signs::of(&packet).agree(live) && self.packet::<V, ANY, COUNT>(at, live) {
+        if live != 0 && !self.apart && Signs::of(&packet).agree(live) && self.packet::<V, ANY, COUNT>(at, live) {
             return 0;
         }
         self.sort(at, &packet, t_max, live)
@@ -351,12 +353,12 @@ fn call<V: Lanes, const ANY: bool>(
 {
     let super::Memory { stack, stream: memory } = V::Scalar::memory(scratch);
     stack.reserve(world.stack_bound());
-    let starts = (0..rays.len()).step_by(V::N);
+    let (starts, apart) = ((0..rays.len()).step_by(V::N), false);
     match counters {
-        Some(counters) => Job { world, rays, memory, stack, counters, output }.run::<V, ANY, true>(starts),
+        Some(counters) => Job { world, rays, memory, stack, counters, output, apart }.run::<V, ANY, true>(starts),
         None => {
             let counters = &mut Counters::default();
-            Job { world, rays, memory, stack, counters, output }.run::<V, ANY, false>(starts);
+            Job { world, rays, memory, stack, counters, output, apart }.run::<V, ANY, false>(starts);
         }
     }
 }

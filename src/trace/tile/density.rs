@@ -1,5 +1,6 @@
 //! Triangles so much smaller than the distance of a tile's rays that neighbours have few of them in common: such a tile would
-//! set up thousands of triangles that no ray meets, and single rays ([`super::super::stream`]) are the faster way.
+//! set up thousands of triangles that no ray meets. Chunks of rays ([`super::super::stream`]) are the faster way there: packets are
+//! not, as a chunk waits for the memory of many nodes at once.
 //!
 //! What decides is the triangle that the ray in the middle of the tile meets, so that the same rays get the same bits whatever
 //! tree their world has and whatever was traced before.
@@ -14,11 +15,11 @@ use crate::trace::query::Query;
 use crate::trace::traverse;
 
 /// Triangles per ray from which on tiles are the slower way.
-const DENSE: f64 = 24.0;
+const DENSE: f64 = 4.0;
 
 /// Triangles per ray, if they were spread evenly over the directions, up to which nobody looks: the ray in the middle costs
 /// what a few triangles for a whole tile cost.
-const SPREAD: f32 = 2.0;
+const SPREAD: f32 = 1.0;
 
 impl Job<'_> {
     /// Whether the loaded tile of `N` sets sees such triangles.

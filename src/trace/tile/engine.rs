@@ -86,8 +86,8 @@ impl Job<'_> {
             true => self.tile::<1, false, EXACT, COUNT>(&mut bundle, groups),
             false => self.tile::<SETS, false, EXACT, COUNT>(&mut bundle, groups),
         };
-        let is_done = traced && self.memory.rest.is_empty();
-        self.memory.rest.clear();
+        let is_done = traced && self.memory.apart.is_empty();
+        self.memory.apart.clear();
         is_done
     }
 }

@@ -268,7 +268,15 @@ impl Job<'_> {
         rays.close(ids.len());
         hits.prepare(ids.len());
         let Self { world, stream: memory, stack, counters, .. } = self;
-        let mut job = stream::Job { world, rays: &rays, memory, stack, counters, output: Output::Closest(&mut hits) };
+        let mut job = stream::Job {
+            world,
+            rays: &rays,
+            memory,
+            stack,
+            counters,
+            output: Output::Closest(&mut hits),
+            apart: false,
+        };
         job.run::<V, false, COUNT>((0..ids.len()).step_by(V::N));
         if let Output::Closest(to) = &mut self.output {
             for (i, &id) in ids.iter().enumerate() {

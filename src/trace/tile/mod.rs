@@ -93,6 +93,8 @@ pub struct Memory {
     visitors: stream::Visitors<f32>,
     /// Where groups start that are for the stream kernel.
     rest: Vec<usize>,
+    /// The same of tiles whose rays are much farther apart than triangles.
+    apart: Vec<usize>,
     /// Single rays that are.
     left: mirror::Left,
 }
@@ -223,15 +225,20 @@ impl<'a> Job<'a> {
         if self.memory.left.len() > 0 {
             self.leftovers::<COUNT>();
         }
-        if self.memory.rest.is_empty() {
-            return;
+        let rest = std::mem::take(&mut self.memory.rest);
+        self.memory.rest = self.streamed::<ANY, COUNT>(rest, false);
+        let apart = std::mem::take(&mut self.memory.apart);
+        self.memory.apart = self.streamed::<ANY, COUNT>(apart, true);
+    }
+
+    /// Traces the groups that start at `starts` by the stream kernel; returns the list, empty. `apart`: see [`stream::Job`].
+    fn streamed<const ANY: bool, const COUNT: bool>(&mut self, mut starts: Vec<usize>, apart: bool) -> Vec<usize> {
+        if !starts.is_empty() {
+            let Self { world, rays, stream: memory, stack, counters, output, .. } = self;
+            let mut job = stream::Job { world, rays, memory, stack, counters, output: output.reborrow(), apart };
+            job.run::<V, ANY, COUNT>(starts.drain(..));
         }
-        let starts = std::mem::take(&mut self.memory.rest);
-        let Self { world, rays, stream: memory, stack, counters, output, .. } = self;
-        let mut job = stream::Job { world, rays, memory, stack, counters, output: output.reborrow() };
-        job.run::<V, ANY, COUNT>(starts.iter().copied());
-        self.memory.rest = starts;
-        self.memory.rest.clear();
+        starts
     }
 
     /// Traces a block after one look at its rays; false if they are not what was presumed, or spread too wide.
@@ -301,8 +308,7 @@ impl<'a> Job<'a> {
             return false;
         }
         if self.is_dense::<N>() {
-            // For the stream kernel.
-            self.memory.rest.extend(listing::groups(groups).map(|g| bundle.first + g * V::N));
+            self.memory.apart.extend(listing::groups(groups).map(|g| bundle.first + g * V::N));
             return true;
         }
         let next = Next::of(self.rays, bundle.first + bundle.len * V::N);
