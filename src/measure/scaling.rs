@@ -89,7 +89,7 @@ mod tests {
             row("scalar", 1, 3.0, Some(1.0)),
             row("tile", 1, 0.75, Some(1.0)),
             row("stream", 2, 1.0, Some(1.0)),
-            Row { outcome: Outcome::Wrong { unexplained: 1, examples: Vec::new() }, ..row("stream", 1, 0.0, None) },
+            Row { outcome: Outcome::Wrong("1 ray".into()), ..row("stream", 1, 0.0, None) },
             row("embree", 2, 1.0, None),
         ];
         let text = table(&rows);
