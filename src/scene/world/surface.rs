@@ -154,21 +154,20 @@ impl<S: Real> World<S> {
     pub fn bare_triangle(&self, prim: u32, inst: u32) -> Bare {
         let run = self.runs[self.assembly.placements[inst as usize].object as usize].of(prim);
         let plain = |mesh: &Mesh| mesh.normals.values.is_empty();
-        Bare { material: run.material, triangle: self.triangle_if(prim, inst, plain) }
+        Bare { material: run.material, triangle: self.triangle_if(run.part, prim, inst, plain) }
     }
 
     /// First corner of a triangle and the edges from it to the second and the third, world space; `None` if `prim` is something
     /// else.
     pub fn triangle(&self, prim: u32, inst: u32) -> Option<[DVec3; 3]> {
-        self.triangle_if(prim, inst, |_| true)
+        self.triangle_if(self.part(self.assembly.placements[inst as usize].object, prim), prim, inst, |_| true)
     }
 
-    /// [`Self::triangle`], if its mesh is `wanted`.
+    /// [`Self::triangle`] of part `part`, if its mesh is `wanted`.
     #[inline(always)]
-    fn triangle_if(&self, prim: u32, inst: u32, wanted: impl Fn(&Mesh) -> bool) -> Option<[DVec3; 3]> {
+    fn triangle_if(&self, part: u32, prim: u32, inst: u32, wanted: impl Fn(&Mesh) -> bool) -> Option<[DVec3; 3]> {
         let placement = &self.assembly.placements[inst as usize];
-        let run = self.runs[placement.object as usize].of(prim);
-        let part = &self.assembly.objects[placement.object as usize].parts[run.part as usize];
+        let part = &self.assembly.objects[placement.object as usize].parts[part as usize];
         let PartKind::Mesh(mesh) = &part.kind else { return None };
         if !wanted(mesh) {
             return None;
