@@ -54,7 +54,7 @@ impl<S> Binary<S> {
 impl<S: Real> Binary<S> {
     /// The tree above those nodes that have a number in `numbers`, which becomes the primitive of a leaf.
     pub fn above(&self, numbers: &[Option<u32>]) -> Self {
-        let mut above = Self { nodes: Vec::new(), prims: Vec::new() };
+        let mut above = Self::empty();
         let mut waiting = vec![(0, None)];
         while let Some((node, slot)) = waiting.pop() {
             let id = match (numbers[node], self.nodes[node].children()) {
@@ -74,20 +74,44 @@ impl<S: Real> Binary<S> {
         above
     }
 
+    fn empty() -> Self {
+        Self { nodes: Vec::new(), prims: Vec::new() }
+    }
+
     fn append(&mut self, slot: Slot, left: u32, right: u32) -> usize {
         let id = self.nodes.len();
         self.nodes.push(Node { bounds: Aabb::EMPTY, left, right });
+        self.hang(id, slot);
+        id
+    }
+
+    /// Makes a node a child.
+    fn hang(&mut self, id: usize, slot: Slot) {
         match slot {
             Some((parent, 0)) => self.nodes[parent].left = id as u32,
             Some((parent, _)) => self.nodes[parent].right = id as u32,
             None => {}
         }
-        id
+    }
+
+    /// Appends a whole tree.
+    fn graft(&mut self, tree: &Self, slot: Slot) {
+        // Of a tree that is one leaf left for a frame of its own there is no node.
+        if tree.nodes.is_empty() {
+            return;
+        }
+        let (nodes, prims) = (self.nodes.len() as u32, self.prims.len() as u32);
+        self.nodes.extend(tree.nodes.iter().map(|node| match node.children() {
+            Some(_) => Node { left: node.left + nodes, right: node.right + nodes, ..*node },
+            None => Node { left: node.left + prims, ..*node },
+        }));
+        self.prims.extend_from_slice(&tree.prims);
+        self.hang(nodes as usize, slot);
     }
 
     fn append_leaf(&mut self, slot: Slot, parts: &[Part]) {
         self.append(slot, self.prims.len() as u32, !(parts.len() as u32));
-        self.prims.extend(parts.iter().map(|part| part.prim));
+        self.prims.extend(parts.iter().map(Part::prim));
     }
 }
 
@@ -160,27 +184,83 @@ fn plant<S: Real>(
         return;
     }
     let refined = Refined::new(&grown, settings.leaf as u32, &rounds(settings.preset));
-    let place = |at: usize| refined.as_ref().map_or(Place::Kept(at), |r| r.place(at));
-    let mut stack = vec![(place(0), slot)];
-    while let Some((here, slot)) = stack.pop() {
-        let children = match here {
-            Place::Inner(one, other) => [place(one), place(other)],
-            Place::Kept(at) if grown[at].leaf => {
-                let first = grown[at].at as usize;
-                let parts = &parts[first..first + grown[at].count as usize];
-                let class = |part: &Part| classes[part.prim as usize];
-                if parts.len() <= settings.leaf && parts.iter().all(|part| class(part) == class(&parts[0])) {
-                    tree.append_leaf(slot, parts);
-                } else {
-                    todo.push((parts.iter().map(|part| part.prim).collect(), slot));
-                }
+    let order = Order { grown: &grown, parts: &parts, refined: refined.as_ref(), classes, leaf: settings.leaf };
+    order.append((order.place(0), slot), tree, todo);
+}
+
+/// Levels of a tree that are put in order before what is below them is, piece by piece.
+const UPPER: u32 = 7;
+
+/// What puts the nodes of a tree in order, children after their parents.
+struct Order<'a> {
+    grown: &'a [topdown::Node],
+    parts: &'a [Part],
+    refined: Option<&'a Refined>,
+    classes: &'a [u8],
+    /// Most primitives in a leaf.
+    leaf: usize,
+}
+
+impl Order<'_> {
+    fn place(&self, at: usize) -> Place {
+        self.refined.map_or(Place::Kept(at), |refined| refined.place(at))
+    }
+
+    /// Appends the tree below a place to `tree`, in pieces on all threads; what needs a frame of its own is put on `todo`.
+    fn append<S: Real>(&self, root: (Place, Slot), tree: &mut Binary<S>, todo: &mut Vec<(Vec<u32>, Slot)>) {
+        let mut below = Vec::new();
+        self.walk((root.0, None), UPPER, &mut Binary::<S>::empty(), &mut Vec::new(), |place, _, _, _| {
+            below.push(place);
+        });
+        let piece = |place| {
+            let mut piece = (Binary::<S>::empty(), Vec::new());
+            self.walk((place, None), u32::MAX, &mut piece.0, &mut piece.1, |_, _, _, _| {});
+            piece
+        };
+        let mut pieces = below.into_par_iter().map(piece).collect::<Vec<_>>().into_iter();
+        self.walk(root, UPPER, tree, todo, |_, slot, tree, todo| {
+            let (piece, left) = pieces.next().expect("places in the order of the first walk");
+            let first = tree.nodes.len();
+            tree.graft(&piece, slot);
+            let moved = |own: Slot| own.map_or(slot, |(parent, side)| Some((first + parent, side)));
+            todo.extend(left.into_iter().map(|(prims, own)| (prims, moved(own))));
+        });
+    }
+
+    /// Appends what is less than `levels` below a place to `tree`; the rest goes to `deeper`.
+    fn walk<S: Real>(
+        &self,
+        (root, slot): (Place, Slot),
+        levels: u32,
+        tree: &mut Binary<S>,
+        todo: &mut Vec<(Vec<u32>, Slot)>,
+        mut deeper: impl FnMut(Place, Slot, &mut Binary<S>, &mut Vec<(Vec<u32>, Slot)>),
+    ) {
+        let mut stack = vec![(root, slot, 0)];
+        while let Some((here, slot, level)) = stack.pop() {
+            if level == levels {
+                deeper(here, slot, tree, todo);
                 continue;
             }
-            Place::Kept(at) => [Place::Kept(at + 1), Place::Kept(grown[at].at as usize)],
-        };
-        let id = tree.append(slot, 0, 0);
-        stack.push((children[1], Some((id, 1))));
-        stack.push((children[0], Some((id, 0))));
+            let children = match here {
+                Place::Inner(one, other) => [self.place(one), self.place(other)],
+                Place::Kept(at) if self.grown[at].leaf => {
+                    let topdown::Node { at: first, count, .. } = self.grown[at];
+                    let parts = &self.parts[first as usize..][..count as usize];
+                    let class = |part: &Part| self.classes[part.prim() as usize];
+                    if parts.len() <= self.leaf && parts.iter().all(|part| class(part) == class(&parts[0])) {
+                        tree.append_leaf(slot, parts);
+                    } else {
+                        todo.push((parts.iter().map(Part::prim).collect(), slot));
+                    }
+                    continue;
+                }
+                Place::Kept(at) => self.grown[at].children(at).map(Place::Kept),
+            };
+            let id = tree.append(slot, 0, 0);
+            stack.push((children[1], Some((id, 1)), level + 1));
+            stack.push((children[0], Some((id, 0)), level + 1));
+        }
     }
 }
 
@@ -199,7 +279,7 @@ fn frame<S: Real>(boxes: &[Aabb<S>], prims: &[u32]) -> (Vec<Part>, f32) {
         let b = Aabb::<f32>::enclosing((lo - centre) * scale, (hi - centre) * scale);
         Span::new(b.lo, b.hi)
     };
-    let part = |&prim: &u32| Part { bounds: framed(&boxes[prim as usize]), prim };
+    let part = |&prim: &u32| Part::new(framed(&boxes[prim as usize]), prim);
     let mut parts = with_large_pages(prims.len());
     prims.par_iter().with_min_len(FRAMED).map(part).collect_into_vec(&mut parts);
     (parts, framed(&all).area())

@@ -1,5 +1,7 @@
 //! Building a tree: binary build, collapse, depth-first emission.
 
+use rayon::prelude::*;
+
 use super::binary::{self, Binary};
 use super::collapse::Plan;
 use super::node::{Child, LEAF_PRIMS, Node, WIDE, WIDTH};
@@ -55,14 +57,23 @@ pub struct Tree<S> {
 }
 
 /// A leaf of a new tree: which primitives go into which block of which class.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Leaf {
     /// Class of the primitives.
     pub class: u8,
     /// Number of the block among the blocks of this class; leaves of a class come in ascending order.
     pub block: u32,
-    /// Primitives, ascending, at most eight (or what [`BuildSettings::leaf`] says).
-    pub prims: Vec<u32>,
+    /// How many primitives, at most eight (or what [`BuildSettings::leaf`] says).
+    pub count: u8,
+    /// These, ascending, then zeros.
+    pub list: [u32; LEAF_PRIMS],
+}
+
+impl Leaf {
+    /// Its primitives, ascending.
+    pub fn prims(&self) -> &[u32] {
+        &self.list[..usize::from(self.count)]
+    }
 }
 
 /// A tree seen by its nodes of `W` children.
@@ -144,10 +155,11 @@ pub fn build_by_cost<S: Real>(
     let leaf = |(&source, child): (&usize, &Child)| Leaf {
         class: child.class,
         block: child.index,
-        prims: plan.prims(&binary, source),
+        count: child.count,
+        list: plan.prims(&binary, source),
     };
     let (leaves, (wide, wide_depth)) = rayon::join(
-        || sources.iter().zip(&made).map(leaf).collect(),
+        || sources.par_iter().zip(&made).map(leaf).collect(),
         || if S::Children::N >= WIDE { widen(&binary, &numbers, &made) } else { (Vec::new(), 0) },
     );
     (Tree { nodes, wide, depth, wide_depth, bounds: binary.nodes[0].bounds }, leaves)

@@ -152,17 +152,21 @@ impl<const W: usize> Plan<W> {
         }
     }
 
-    /// Primitives below `node`, ascending.
-    pub fn prims<S>(&self, tree: &Binary<S>, node: usize) -> Vec<u32> {
-        let mut prims = Vec::with_capacity(self.counts[node] as usize);
+    /// Primitives below `node`, which becomes a leaf: as many as there are, ascending, then zeros.
+    pub fn prims<S>(&self, tree: &Binary<S>, node: usize) -> [u32; LEAF_PRIMS] {
+        let (mut prims, mut count) = ([0; LEAF_PRIMS], 0);
         let mut stack = vec![node];
         while let Some(i) = stack.pop() {
             match tree.nodes[i].children() {
                 Some([l, r]) => stack.extend([r, l]),
-                None => prims.extend_from_slice(tree.prims(i)),
+                None => {
+                    let some = tree.prims(i);
+                    prims[count..][..some.len()].copy_from_slice(some);
+                    count += some.len();
+                }
             }
         }
-        prims.sort_unstable();
+        prims[..count].sort_unstable();
         prims
     }
 }

@@ -53,10 +53,10 @@ impl<S: Real> Tree<S> {
     pub fn validate(&self, boxes: &[Aabb<S>], classes: &[u8], leaves: &[Leaf]) -> Result<(), String> {
         let mut seen = vec![false; boxes.len()];
         for leaf in leaves {
-            if leaf.prims.is_empty() || leaf.prims.len() > LEAF_PRIMS {
-                return Err(format!("a leaf holds {} primitives", leaf.prims.len()));
+            if !(1..=LEAF_PRIMS).contains(&usize::from(leaf.count)) {
+                return Err(format!("a leaf holds {} primitives", leaf.count));
             }
-            for &p in &leaf.prims {
+            for &p in leaf.prims() {
                 if std::mem::replace(&mut seen[p as usize], true) {
                     return Err(format!("primitive {p} is in two leaves"));
                 }
@@ -111,13 +111,13 @@ impl<S: Real> Tree<S> {
                     continue;
                 }
                 let at = by_block.get(&(child.class, child.index)).copied();
-                let Some(at) = at.filter(|&at| leaves[at].prims.len() == usize::from(child.count)) else {
+                let Some(at) = at.filter(|&at| leaves[at].count == child.count) else {
                     return Err(format!("child {slot} of node {index} refers to no leaf of its size"));
                 };
                 if std::mem::replace(&mut used[at], true) {
                     return Err(format!("leaf {at} is referred to twice"));
                 }
-                if let Some(p) = leaves[at].prims.iter().find(|&&p| !child_bounds.contains(&boxes[p as usize])) {
+                if let Some(p) = leaves[at].prims().iter().find(|&&p| !child_bounds.contains(&boxes[p as usize])) {
                     return Err(format!("primitive {p} sticks out of its leaf"));
                 }
             }

@@ -5,7 +5,7 @@
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node, reinsertion::ReinsertionOptimizer};
 
-use super::topdown::{Node, Span};
+use super::topdown::Node;
 
 /// What there is at a place of a refined tree.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +40,7 @@ impl Refined {
                 list[at].first_index = kept.len() as u32;
                 kept.push(source as u32);
             } else {
-                let children = [source + 1, nodes[source].at as usize];
+                let children = nodes[source].children(source);
                 list[at].prim_count = 0;
                 list[at].first_index = sources.len() as u32;
                 sources.extend(children);
@@ -68,7 +68,6 @@ impl Refined {
     }
 }
 
-fn node(bounds: &Span) -> Bvh2Node {
-    let [lo, hi] = bounds.corners();
+fn node(&[lo, hi]: &[[f32; 3]; 2]) -> Bvh2Node {
     Bvh2Node::new(Aabb::new(lo.into(), hi.into()), 1, 0)
 }

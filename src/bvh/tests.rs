@@ -64,7 +64,11 @@ fn leaves_are_as_small_as_asked_for() {
             let settings = BuildSettings { leaf, ..Preset::Balanced.into() };
             let (tree, leaves) = build(&boxes, &classes, settings);
             tree.validate(&boxes, &classes, &leaves).unwrap();
-            assert_eq!(leaves.iter().map(|l| l.prims.len()).max(), Some(leaf), "at most {leaf}, and some are full");
+            assert_eq!(
+                leaves.iter().map(|l| usize::from(l.count)).max(),
+                Some(leaf),
+                "at most {leaf}, and some are full"
+            );
             tree.nodes.len()
         })
         .collect();
@@ -126,7 +130,7 @@ fn validation_finds_planted_faults() {
         change(&mut t, &mut l);
         t.validate(&boxes, &classes, &l).is_err()
     };
-    assert!(fault(&|_, l| l[0].prims[0] = l[1].prims[0]));
+    assert!(fault(&|_, l| l[0].list[0] = l[1].list[0]));
     assert!(fault(&|_, l| drop(l.pop())));
     assert!(fault(&|t, _| t.nodes[1].bounds[0][1][0] += 10.0));
     assert!(fault(&|t, _| t.nodes[1].bounds[0][1][0] -= 0.5));
@@ -172,7 +176,7 @@ fn walls_are_kept_apart_from_what_is_in_the_room() {
     for preset in [Preset::Fast, Preset::Balanced, Preset::Best] {
         let (_, leaves) = build(&room, &vec![0; room.len()], preset);
         let tallest = leaves.iter().map(|leaf| {
-            let all: Vec<_> = leaf.prims.iter().map(|&p| room[p as usize]).collect();
+            let all: Vec<_> = leaf.prims().iter().map(|&p| room[p as usize]).collect();
             join(&all).hi[1] - join(&all).lo[1]
         });
         assert!(tallest.fold(0.0, f32::max) < 0.2);
@@ -191,11 +195,10 @@ fn grown(boxes: &[Aabb<f32>]) -> Grown {
 }
 
 fn grown_to(boxes: &[Aabb<f32>], deepest: usize) -> Grown {
-    let mut parts: Vec<Part> =
-        boxes.iter().zip(0..).map(|(b, prim)| Part { bounds: Span::new(b.lo, b.hi), prim }).collect();
+    let mut parts: Vec<Part> = boxes.iter().zip(0..).map(|(b, prim)| Part::new(Span::new(b.lo, b.hi), prim)).collect();
     let cost = Cost::new(join(boxes).half_area() as f32);
     let nodes = topdown::build(&mut parts, Rules { block: BLOCK, least: 1e-6, deepest, cost });
-    let mut prims: Vec<u32> = parts.iter().map(|p| p.prim).collect();
+    let mut prims: Vec<u32> = parts.iter().map(Part::prim).collect();
     prims.sort_unstable();
     assert!(prims.into_iter().eq(0..boxes.len() as u32));
     let mut leaves = Vec::new();
@@ -206,16 +209,16 @@ fn grown_to(boxes: &[Aabb<f32>], deepest: usize) -> Grown {
             let first = node.at as usize;
             leaves.push(first..first + node.count as usize);
         } else {
-            let children = [at + 1, node.at as usize];
+            let children = node.children(at);
             assert_eq!(node.count, children.iter().map(|&c| nodes[c].count).sum::<u32>());
-            assert_eq!(node.bounds.corners(), union(children.map(|c| nodes[c].bounds.corners())));
+            assert_eq!(node.bounds, union(children.map(|c| nodes[c].bounds)));
             stack.extend(children.into_iter().rev());
         }
     }
     assert_eq!((leaves[0].start, leaves.last().unwrap().end), (0, parts.len()));
     assert!(leaves.windows(2).all(|l| l[0].end == l[1].start));
     for leaf in &leaves {
-        let all: Vec<_> = parts[leaf.clone()].iter().map(|p| boxes[p.prim as usize]).collect();
+        let all: Vec<_> = parts[leaf.clone()].iter().map(|p| boxes[p.prim() as usize]).collect();
         let least = cost.is_one_leaf(join(&all).half_area() as f32, all.len() as u32);
         assert!(leaf.len() == 1 || leaf.len() > BLOCK || least, "a leaf of {}", leaf.len());
     }
@@ -228,6 +231,10 @@ fn join(boxes: &[Aabb<f32>]) -> Aabb<f32> {
 
 fn union([a, b]: [[[f32; 3]; 2]; 2]) -> [[f32; 3]; 2] {
     [[0, 1, 2].map(|i| a[0][i].min(b[0][i])), [0, 1, 2].map(|i| a[1][i].max(b[1][i]))]
+}
+
+fn area([lo, hi]: [[f32; 3]; 2]) -> f32 {
+    Span::new(lo, hi).area()
 }
 
 #[test]
@@ -254,7 +261,7 @@ fn depth(boxes: &[Aabb<f32>], deepest: usize) -> usize {
     while let Some((at, depth)) = stack.pop() {
         most = most.max(depth);
         if !nodes[at].leaf {
-            stack.extend([at + 1, nodes[at].at as usize].map(|child| (child, depth + 1)));
+            stack.extend(nodes[at].children(at).map(|child| (child, depth + 1)));
         }
     }
     most
@@ -283,8 +290,8 @@ fn the_first_split_is_the_cheapest_of_all_planes() {
             (1..n).map(move |left| cost(&sorted[..left]) + cost(&sorted[left..])).collect::<Vec<_>>()
         });
         let least = planes.fold(f32::INFINITY, f32::min);
-        let side = |at: usize| model.guess(nodes[at].bounds.area(), nodes[at].count, BLOCK);
-        let chosen = side(1) + side(nodes[0].at as usize);
+        let side = |at: usize| model.guess(area(nodes[at].bounds), nodes[at].count, BLOCK);
+        let chosen = nodes[0].children(0).map(side).iter().sum::<f32>();
         assert!((chosen - least).abs() < 1e-5 * least, "{chosen} instead of {least}");
     }
 }
@@ -308,8 +315,8 @@ fn refinement_moves_subtrees_to_where_they_cost_less() {
             if kept(at) {
                 clusters.push(at);
             } else {
-                before += nodes[at].bounds.area();
-                stack.extend([at + 1, nodes[at].at as usize]);
+                before += area(nodes[at].bounds);
+                stack.extend(nodes[at].children(at));
             }
         }
         let refined = Refined::new(&nodes, whole, &[1.0, 0.5]).unwrap();
@@ -327,17 +334,17 @@ fn refined_area(
     tree: &Refined,
     nodes: &[topdown::Node],
     at: usize,
-    area: &mut f32,
+    sum: &mut f32,
     kept: &mut Vec<usize>,
 ) -> [[f32; 3]; 2] {
     match tree.place(at) {
         Place::Kept(node) => {
             kept.push(node);
-            nodes[node].bounds.corners()
+            nodes[node].bounds
         }
         Place::Inner(one, other) => {
-            let all = union([one, other].map(|at| refined_area(tree, nodes, at, area, kept)));
-            *area += Span::new(all[0], all[1]).area();
+            let all = union([one, other].map(|at| refined_area(tree, nodes, at, sum, kept)));
+            *sum += area(all);
             all
         }
     }

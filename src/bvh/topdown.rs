@@ -57,27 +57,53 @@ impl Span {
     }
 }
 
-/// A primitive to be put into a tree.
+/// A primitive to be put into a tree: its box, in a frame of about unit size, and its number.
 #[derive(Clone, Copy, Debug)]
-pub struct Part {
-    /// Its box, in a frame of about unit size.
-    pub bounds: Span,
+#[repr(transparent)]
+pub struct Part(Span);
+
+impl Part {
+    /// Primitive `prim`, which has the box `span`.
+    pub fn new(mut span: Span, prim: u32) -> Self {
+        // The box leaves two numbers' room. Its halves are ordinary numbers there; as bits they would be denormal, and slow.
+        (span.0[3], span.0[7]) = (f32::from((prim >> 16) as u16), f32::from(prim as u16));
+        Self(span)
+    }
+
     /// Its number.
-    pub prim: u32,
+    pub fn prim(&self) -> u32 {
+        (self.0.0[3] as u32) << 16 | self.0.0[7] as u32
+    }
 }
 
 /// A node of a new tree over a list of parts, which building puts in order. The left child follows its parent.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
-    /// Box of all below.
-    pub bounds: Span,
+    /// Lower and upper corner of the box of all below.
+    pub bounds: [[f32; 3]; 2],
     /// Parts below.
     pub count: u32,
-    /// Of an inner node: the right child; of a leaf: its first part.
+    /// Of an inner node: how many nodes after it the right child comes; of a leaf: its first part.
     pub at: u32,
     /// A leaf holds one part, or a block at most that costs least as one leaf, or more than a block of such parts whose centres
     /// nothing tells apart.
     pub leaf: bool,
+}
+
+impl Node {
+    fn leaf(extent: &Extent, count: usize, first: usize) -> Self {
+        Self { bounds: extent.bounds.corners(), count: count as u32, at: first as u32, leaf: true }
+    }
+
+    /// Makes an inner node of it, whose left child has `left` nodes.
+    fn divide(&mut self, left: usize) {
+        (self.leaf, self.at) = (false, left as u32 + 1);
+    }
+
+    /// The children of the inner node that is the `own`th of the list.
+    pub fn children(&self, own: usize) -> [usize; 2] {
+        [own + 1, own + self.at as usize]
+    }
 }
 
 /// How trees are built.
@@ -93,65 +119,100 @@ pub struct Rules {
     pub cost: Cost,
 }
 
-/// Builds a tree over some parts. Some nodes of the result are not in the tree: the root is the first. Deterministic on any
-/// number of threads.
+/// Builds a tree over some parts, whose root is the first node. Deterministic on any number of threads.
 pub fn build(parts: &mut [Part], rules: Rules) -> Vec<Node> {
-    let unused = Node { bounds: Span::EMPTY, count: 0, at: 0, leaf: true };
-    let len = (2 * parts.len()).saturating_sub(1);
-    let mut nodes = with_large_pages(len);
-    nodes.resize(len, unused);
-    if !parts.is_empty() {
-        grow(parts, &mut nodes, (0, 0), rules, 0);
+    if parts.is_empty() {
+        return Vec::new();
     }
+    let all = match parts.len() {
+        0..=CHUNK => Extent::of(parts),
+        _ => parts.par_chunks(CHUNK).map(Extent::of).reduce(|| Extent::EMPTY, Extent::join),
+    };
+    let lists = grow_apart(parts, 0, &all, rules, 0);
+    let mut nodes = with_large_pages(lists.iter().map(Vec::len).sum());
+    lists.iter().for_each(|list| nodes.extend_from_slice(list));
     nodes
 }
 
-/// Builds the tree over `parts` into `nodes`, which begin at `first` of all parts and of all nodes, `level` nodes below the root.
-fn grow(parts: &mut [Part], nodes: &mut [Node], first: (usize, usize), rules: Rules, level: usize) {
-    let n = parts.len();
-    let (bounds, centres) = extent(parts);
-    nodes[0] = Node { bounds, count: n as u32, at: first.0 as u32, leaf: true };
-    let [low, high] = centres.corners();
-    let told_apart = (0..3).any(|a| high[a] - low[a] > rules.least);
-    let is_one_leaf = n == 1 || n <= rules.block && rules.cost.is_one_leaf(bounds.area(), n as u32);
-    if is_one_leaf || !told_apart && n > rules.block {
-        return;
+/// The tree over `parts`, which begin at `first` of all parts and have the extent `all`, `level` nodes below the root, as lists of
+/// nodes to be put together.
+fn grow_apart(parts: &mut [Part], first: usize, all: &Extent, rules: Rules, level: usize) -> Vec<Vec<Node>> {
+    if parts.len() < PARALLEL {
+        let mut nodes = Vec::new();
+        grow(parts, first, all, rules, level, &mut nodes);
+        return vec![nodes];
     }
-    let on_left = match n {
-        _ if !told_apart || level > rules.deepest => halve(parts),
-        0..BINNED => split_sorted(parts, rules),
-        _ => split_binned(parts, low, high, rules),
-    };
-    // Areas that are no numbers: left to a frame of their own.
-    let Some(on_left) = on_left else { return };
+    let mut root = Node::leaf(all, parts.len(), first);
+    let Some((on_left, sides)) = split(parts, all, rules, level) else { return vec![vec![root]] };
     let (left, right) = parts.split_at_mut(on_left);
-    let (root, below) = nodes.split_first_mut().expect("a node per part at least");
-    let (left_nodes, right_nodes) = below.split_at_mut(2 * on_left - 1);
-    root.leaf = false;
-    root.at = (first.1 + 2 * on_left) as u32;
-    let at = root.at as usize;
-    let mut one = || grow(left, left_nodes, (first.0, first.1 + 1), rules, level + 1);
-    let mut other = || grow(right, right_nodes, (first.0 + on_left, at), rules, level + 1);
-    if n < PARALLEL {
-        one();
-        other();
-    } else {
-        rayon::join(one, other);
-    }
+    let (mut left, mut right) = rayon::join(
+        || grow_apart(left, first, &sides[0], rules, level + 1),
+        || grow_apart(right, first + on_left, &sides[1], rules, level + 1),
+    );
+    root.divide(left.iter().map(Vec::len).sum());
+    let mut lists = vec![vec![root]];
+    lists.append(&mut left);
+    lists.append(&mut right);
+    lists
 }
 
-/// Box of all, and box of all centres (twice).
-fn extent(parts: &[Part]) -> (Span, Span) {
-    let join = |a: (Span, Span), b: (Span, Span)| (a.0.union(&b.0), a.1.union(&b.1));
-    let of = |parts: &[Part]| {
-        parts.iter().fold((Span::EMPTY, Span::EMPTY), |all, part| {
-            let centre = part.bounds.centre();
-            join(all, (part.bounds, Span::new(centre, centre)))
-        })
+/// Appends that tree to `nodes`.
+fn grow(parts: &mut [Part], first: usize, all: &Extent, rules: Rules, level: usize, nodes: &mut Vec<Node>) {
+    let root = nodes.len();
+    nodes.push(Node::leaf(all, parts.len(), first));
+    let Some((on_left, sides)) = split(parts, all, rules, level) else { return };
+    let (left, right) = parts.split_at_mut(on_left);
+    grow(left, first, &sides[0], rules, level + 1, nodes);
+    let on_left_side = nodes.len() - root - 1;
+    nodes[root].divide(on_left_side);
+    grow(right, first + on_left, &sides[1], rules, level + 1, nodes);
+}
+
+/// A split: how many parts go to the left, and the extents of both sides.
+type Sides = (usize, [Extent; 2]);
+
+/// Puts the parts of the left side first, or finds that all are one leaf.
+fn split(parts: &mut [Part], all: &Extent, rules: Rules, level: usize) -> Option<Sides> {
+    let n = parts.len();
+    let [low, high] = all.centres.corners();
+    let told_apart = (0..3).any(|a| high[a] - low[a] > rules.least);
+    let is_one_leaf = n == 1 || n <= rules.block && rules.cost.is_one_leaf(all.bounds.area(), n as u32);
+    if is_one_leaf || !told_apart && n > rules.block {
+        return None;
+    }
+    // Areas that are no numbers are not split: left to a frame of their own.
+    let on_left = match n {
+        _ if !told_apart || level > rules.deepest => halve(parts),
+        0..BINNED => split_sorted(parts, rules)?,
+        _ => return split_binned(parts, low, high, rules),
     };
-    match parts.len() {
-        0..=CHUNK => of(parts),
-        _ => parts.par_chunks(CHUNK).map(of).reduce(|| (Span::EMPTY, Span::EMPTY), join),
+    let (left, right) = parts.split_at(on_left);
+    Some((on_left, [left, right].map(Extent::of)))
+}
+
+/// Box of some parts, and box of their centres (twice).
+#[derive(Clone, Copy, Debug)]
+struct Extent {
+    bounds: Span,
+    centres: Span,
+}
+
+impl Extent {
+    const EMPTY: Self = Self { bounds: Span::EMPTY, centres: Span::EMPTY };
+
+    fn of(parts: &[Part]) -> Self {
+        parts.iter().fold(Self::EMPTY, |all, part| all.join(Self::one(part)))
+    }
+
+    #[inline(always)]
+    fn one(part: &Part) -> Self {
+        let centre = part.0.centre();
+        Self { bounds: part.0, centres: Span::new(centre, centre) }
+    }
+
+    #[inline(always)]
+    fn join(self, other: Self) -> Self {
+        Self { bounds: self.bounds.union(&other.bounds), centres: self.centres.union(&other.centres) }
     }
 }
 
@@ -196,9 +257,9 @@ impl Split {
 }
 
 /// Where nothing but size tells apart, or trees would become too deep: the smaller half goes to the left.
-fn halve(parts: &mut [Part]) -> Option<usize> {
-    parts.sort_unstable_by(|a, b| a.bounds.area().total_cmp(&b.bounds.area()).then(a.prim.cmp(&b.prim)));
-    Some(parts.len() / 2)
+fn halve(parts: &mut [Part]) -> usize {
+    parts.sort_unstable_by(|a, b| a.0.area().total_cmp(&b.0.area()).then(a.prim().cmp(&b.prim())));
+    parts.len() / 2
 }
 
 /// Sorts few parts along each axis; puts them in the order of the best and returns how many go to the left.
@@ -209,11 +270,11 @@ fn split_sorted(parts: &mut [Part], rules: Rules) -> Option<usize> {
     let mut orders = [[0; BINNED]; 3];
     for (axis, order) in orders.iter_mut().enumerate() {
         for (i, part) in parts.iter().enumerate() {
-            order[i] = u64::from(ascending(part.bounds.centre()[axis])) << 32 | i as u64;
+            order[i] = u64::from(ascending(part.0.centre()[axis])) << 32 | i as u64;
         }
         order[..n].sort_unstable();
         let mut boxes = [Span::EMPTY; BINNED];
-        (0..n).for_each(|i| boxes[i] = parts[order[i] as u32 as usize].bounds);
+        (0..n).for_each(|i| boxes[i] = parts[order[i] as u32 as usize].0);
         best.look(axis, &boxes[..n], |_| 1, rules);
     }
     if best.cost == f32::INFINITY {
@@ -245,10 +306,10 @@ impl Bins {
     fn of(parts: &[Part], places: &Places) -> Self {
         let mut bins = Self::EMPTY;
         for part in parts {
-            let centre = part.bounds.centre();
+            let centre = part.0.centre();
             for axis in 0..3 {
                 let at = places.of(&centre, axis);
-                bins.boxes[axis][at] = bins.boxes[axis][at].union(&part.bounds);
+                bins.boxes[axis][at] = bins.boxes[axis][at].union(&part.0);
                 bins.counts[axis][at] += 1;
             }
         }
@@ -280,9 +341,9 @@ impl Places {
     }
 }
 
-/// Bins many parts along each axis; puts those of the left side first and returns how many they are.
+/// Bins many parts along each axis; puts those of the left side first.
 #[inline(never)]
-fn split_binned(parts: &mut [Part], low: [f32; 3], high: [f32; 3], rules: Rules) -> Option<usize> {
+fn split_binned(parts: &mut [Part], low: [f32; 3], high: [f32; 3], rules: Rules) -> Option<Sides> {
     let count = (parts.len() / 4).clamp(8, BINS);
     let scale = each(|a| if high[a] > low[a] { count as f32 / (high[a] - low[a]) } else { 0.0 });
     let places = Places { low, scale, count };
@@ -297,15 +358,17 @@ fn split_binned(parts: &mut [Part], low: [f32; 3], high: [f32; 3], rules: Rules)
     if best.cost == f32::INFINITY {
         return None;
     }
-    let goes_left = |part: &Part| places.of(&part.bounds.centre(), best.axis) < best.left;
-    let (mut first, mut last) = (0, parts.len());
-    while first < last {
-        if goes_left(&parts[first]) {
-            first += 1;
-        } else {
-            last -= 1;
-            parts.swap(first, last);
-        }
+    let goes_left = |part: &Part| places.of(&part.0.centre(), best.axis) < best.left;
+    let (mut on_left, mut sides) = (0, [Extent::EMPTY; 2]);
+    // Every part changes places with the first of the right side, which does nothing where it belongs there: nobody can tell
+    // beforehand where parts go. The extents are taken on the way, as parts of large trees come from memory.
+    for at in 0..parts.len() {
+        let part = parts[at];
+        let is_left = goes_left(&part);
+        parts.swap(at, on_left);
+        on_left += usize::from(is_left);
+        let side = &mut sides[usize::from(!is_left)];
+        *side = side.join(Extent::one(&part));
     }
-    Some(first)
+    Some((on_left, sides))
 }

@@ -272,7 +272,7 @@ impl<S: Real> Solid<S> {
         let boxes: Vec<_> = held.iter().map(|&i| self.leaves[i as usize].clip).collect();
         // One leaf of the solid in each leaf of the tree, whose box is then all that is asked of it.
         let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], BuildSettings { preset, leaf: 1 });
-        let numbers = leaves.iter().flat_map(|leaf| leaf.prims.iter().map(|&p| held[p as usize])).collect();
+        let numbers = leaves.iter().flat_map(|leaf| leaf.prims().iter().map(|&p| held[p as usize])).collect();
         self.search = Some((tree, numbers));
         self.always = always;
     }

@@ -52,7 +52,7 @@ impl<S: Real> Mesh<S> {
         let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], Preset::Balanced);
         let blocks = leaves.iter().map(|leaf| {
             let mut block = Block::empty();
-            for (slot, &p) in leaf.prims.iter().enumerate() {
+            for (slot, &p) in leaf.prims().iter().enumerate() {
                 let (numbers, id) = records[p as usize];
                 block.set(slot, numbers, id);
             }

@@ -39,6 +39,9 @@ pub enum Degenerate {
     ZeroArea,
 }
 
+/// Two to the power of -1000: what coordinates are scaled by at most, and one over it.
+const SMALLEST_POWER: f64 = f64::from_bits((1023 - 1000) << 52);
+
 impl Triangle {
     /// Numbers per triangle.
     pub const FIELDS: usize = 9;
@@ -48,23 +51,36 @@ impl Triangle {
     /// # Errors
     /// [`Degenerate`] triangles.
     pub fn record<S: Real>(corners: [DVec3; 3]) -> Result<[S; 9], Degenerate> {
+        let numbers = Self::rounded(corners);
+        Self::check(&numbers).map(|()| numbers)
+    }
+
+    /// Corners rounded to `S`.
+    pub fn rounded<S: Real>(corners: [DVec3; 3]) -> [S; 9] {
         let mut numbers = [S::ZERO; 9];
-        for (i, p) in corners.into_iter().enumerate() {
-            for axis in 0..3 {
-                numbers[3 * i + axis] = S::from_f64(p[axis]);
-            }
+        for (three, p) in numbers.chunks_exact_mut(3).zip(corners) {
+            three.copy_from_slice(&p.to_array().map(S::from_f64));
         }
+        numbers
+    }
+
+    /// Whether rounded corners are those of a triangle that can be hit.
+    ///
+    /// # Errors
+    /// [`Degenerate`] triangles.
+    pub fn check<S: Real>(numbers: &[S; 9]) -> Result<(), Degenerate> {
         if !numbers.iter().all(|x| x.is_finite()) {
             return Err(Degenerate::NonFinite);
         }
         // Scaled by a power of two so that products of tiny or huge coordinates neither vanish nor overflow.
         let largest = numbers.iter().map(|x| x.to_f64().abs()).fold(0.0, f64::max);
-        let scale = if largest > 0.0 { (-largest.log2().floor().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 };
-        let [a, b, c] = Self::corners(&numbers).map(|p| p * scale);
-        if (b - a).cross(c - a) == DVec3::ZERO {
-            return Err(Degenerate::ZeroArea);
+        let power = f64::from_bits(largest.to_bits() & f64::INFINITY.to_bits());
+        let scale = 1.0 / power.clamp(SMALLEST_POWER, 1.0 / SMALLEST_POWER);
+        let [a, b, c] = Self::corners(numbers).map(|p| p * scale);
+        match (b - a).cross(c - a) == DVec3::ZERO {
+            true => Err(Degenerate::ZeroArea),
+            false => Ok(()),
         }
-        Ok(numbers)
     }
 
     /// The stored corners in f64.

@@ -8,7 +8,7 @@ use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
 use super::{Instance, Object};
-use crate::bvh::{self, BuildSettings, Preset, Tree};
+use crate::bvh::{self, BuildSettings, Leaf, Preset, Tree};
 use crate::lanes::Real;
 use crate::math::{Aabb, Affine};
 use crate::scene::assembly::Placement;
@@ -101,7 +101,7 @@ pub fn upper_tree<S: Real>(instances: &[Instance<S>], preset: Preset) -> UpperTr
     let boxes: Vec<_> = ids.iter().map(|&i| instances[i as usize].bounds).collect();
     // To enter an instance costs more than to open a node: each has a box of its own among eight.
     let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], BuildSettings { preset, leaf: 1 });
-    let leaves = leaves.iter().flat_map(|leaf| &leaf.prims).map(|&p| ids[p as usize]).collect();
+    let leaves = leaves.iter().flat_map(Leaf::prims).map(|&p| ids[p as usize]).collect();
     (tree, leaves, unbounded)
 }
 

@@ -6,6 +6,7 @@
 mod compile;
 mod facets;
 mod instances;
+mod primitives;
 mod rounding;
 mod runs;
 mod solids;
