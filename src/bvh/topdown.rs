@@ -307,8 +307,8 @@ impl Bins {
         let mut bins = Self::EMPTY;
         for part in parts {
             let centre = part.0.centre();
-            for axis in 0..3 {
-                let at = places.of(&centre, axis);
+            let at = each(|axis| places.of(&centre, axis));
+            for (axis, at) in at.into_iter().enumerate() {
                 bins.boxes[axis][at] = bins.boxes[axis][at].union(&part.0);
                 bins.counts[axis][at] += 1;
             }
@@ -327,17 +327,30 @@ impl Bins {
     }
 }
 
-/// Where bins begin.
+/// Where the middles of the first bins are, how many there are to a unit, and the last.
 struct Places {
-    low: [f32; 3],
+    first: [f32; 3],
     scale: [f32; 3],
-    count: usize,
+    last: f32,
 }
 
+/// What is added to small numbers to have their nearest whole number in the lowest bits.
+const WHOLE: f32 = (3 << 22) as f32;
+
 impl Places {
+    fn new(low: [f32; 3], high: [f32; 3], count: usize) -> Self {
+        let scale = each(|a| if high[a] > low[a] { count as f32 / (high[a] - low[a]) } else { 0.0 });
+        let first = each(|a| if scale[a] > 0.0 { low[a] + 0.5 / scale[a] } else { low[a] });
+        Self { first, scale, last: (count - 1) as f32 }
+    }
+
     #[inline(always)]
     fn of(&self, centre: &[f32; 3], axis: usize) -> usize {
-        (((centre[axis] - self.low[axis]) * self.scale[axis]) as usize).min(self.count - 1)
+        let place = (centre[axis] - self.first[axis]) * self.scale[axis];
+        // In two comparisons, of which one is true of what is not a number.
+        let place = if place > 0.0 { place } else { 0.0 };
+        let place = if place < self.last { place } else { self.last };
+        (place + WHOLE).to_bits() as usize % BINS
     }
 }
 
@@ -345,14 +358,13 @@ impl Places {
 #[inline(never)]
 fn split_binned(parts: &mut [Part], low: [f32; 3], high: [f32; 3], rules: Rules) -> Option<Sides> {
     let count = (parts.len() / 4).clamp(8, BINS);
-    let scale = each(|a| if high[a] > low[a] { count as f32 / (high[a] - low[a]) } else { 0.0 });
-    let places = Places { low, scale, count };
+    let places = Places::new(low, high, count);
     let bins = match parts.len() {
         0..=CHUNK => Bins::of(parts, &places),
         _ => parts.par_chunks(CHUNK).map(|p| Bins::of(p, &places)).reduce(|| Bins::EMPTY, Bins::join),
     };
     let mut best = Split::NONE;
-    for axis in (0..3).filter(|&a| scale[a] > 0.0) {
+    for axis in (0..3).filter(|&a| places.scale[a] > 0.0) {
         best.look(axis, &bins.boxes[axis][..count], |i| bins.counts[axis][i], rules);
     }
     if best.cost == f32::INFINITY {
