@@ -131,7 +131,8 @@ fn validation_finds_planted_faults() {
         t.validate(&boxes, &classes, &l).is_err()
     };
     assert!(fault(&|_, l| l[0].list[0] = l[1].list[0]));
-    assert!(fault(&|_, l| drop(l.pop())));
+    assert!(fault(&|_, l| l.truncate(l.len() - 1)));
+    assert!(fault(&|_, l| l[0].count = 9));
     assert!(fault(&|t, _| t.nodes[1].bounds[0][1][0] += 10.0));
     assert!(fault(&|t, _| t.nodes[1].bounds[0][1][0] -= 0.5));
     assert!(fault(&|t, _| t.depth -= 1));
@@ -235,6 +236,15 @@ fn union([a, b]: [[[f32; 3]; 2]; 2]) -> [[f32; 3]; 2] {
 
 fn area([lo, hi]: [[f32; 3]; 2]) -> f32 {
     Span::new(lo, hi).area()
+}
+
+#[test]
+fn parts_know_their_numbers() {
+    for prim in [0, 1, 0xffff, 0x1_0000, 0xdead_beef, u32::MAX] {
+        let [lo, hi] = [[-1.0, 0.0, 0.25], [1.0, 0.5, 0.75]];
+        let part = Part::new(Span::new(lo, hi), prim);
+        assert_eq!(part.prim(), prim);
+    }
 }
 
 #[test]

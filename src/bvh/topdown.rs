@@ -48,7 +48,13 @@ impl Span {
     /// Twice the centre.
     #[inline(always)]
     fn centre(&self) -> [f32; 3] {
-        each(|a| self.0[a] - self.0[a + 4])
+        each(|axis| self.along(axis))
+    }
+
+    /// The same of one axis.
+    #[inline(always)]
+    fn along(&self, axis: usize) -> f32 {
+        self.0[axis] - self.0[axis + 4]
     }
 
     /// The lower corner and the upper one.
@@ -270,7 +276,7 @@ fn split_sorted(parts: &mut [Part], rules: Rules) -> Option<usize> {
     let mut orders = [[0; BINNED]; 3];
     for (axis, order) in orders.iter_mut().enumerate() {
         for (i, part) in parts.iter().enumerate() {
-            order[i] = u64::from(ascending(part.0.centre()[axis])) << 32 | i as u64;
+            order[i] = u64::from(ascending(part.0.along(axis))) << 32 | i as u64;
         }
         order[..n].sort_unstable();
         let mut boxes = [Span::EMPTY; BINNED];
@@ -306,8 +312,7 @@ impl Bins {
     fn of(parts: &[Part], places: &Places) -> Self {
         let mut bins = Self::EMPTY;
         for part in parts {
-            let centre = part.0.centre();
-            let at = each(|axis| places.of(&centre, axis));
+            let at = each(|axis| places.of(&part.0, axis));
             for (axis, at) in at.into_iter().enumerate() {
                 bins.boxes[axis][at] = bins.boxes[axis][at].union(&part.0);
                 bins.counts[axis][at] += 1;
@@ -345,8 +350,8 @@ impl Places {
     }
 
     #[inline(always)]
-    fn of(&self, centre: &[f32; 3], axis: usize) -> usize {
-        let place = (centre[axis] - self.first[axis]) * self.scale[axis];
+    fn of(&self, bounds: &Span, axis: usize) -> usize {
+        let place = (bounds.along(axis) - self.first[axis]) * self.scale[axis];
         // In two comparisons, of which one is true of what is not a number.
         let place = if place > 0.0 { place } else { 0.0 };
         let place = if place < self.last { place } else { self.last };
@@ -370,17 +375,19 @@ fn split_binned(parts: &mut [Part], low: [f32; 3], high: [f32; 3], rules: Rules)
     if best.cost == f32::INFINITY {
         return None;
     }
-    let goes_left = |part: &Part| places.of(&part.0.centre(), best.axis) < best.left;
-    let (mut on_left, mut sides) = (0, [Extent::EMPTY; 2]);
-    // Every part changes places with the first of the right side, which does nothing where it belongs there: nobody can tell
-    // beforehand where parts go. The extents are taken on the way, as parts of large trees come from memory.
+    let goes_left = |part: &Part| places.of(&part.0, best.axis) < best.left;
+    let (mut on_left, mut left, mut right) = (0, Extent::EMPTY, Extent::EMPTY);
+    // Every part changes places with the first of the right side. The extents are taken on the way, as parts of large trees come
+    // from memory.
     for at in 0..parts.len() {
         let part = parts[at];
-        let is_left = goes_left(&part);
         parts.swap(at, on_left);
-        on_left += usize::from(is_left);
-        let side = &mut sides[usize::from(!is_left)];
-        *side = side.join(Extent::one(&part));
+        if goes_left(&part) {
+            on_left += 1;
+            left = left.join(Extent::one(&part));
+        } else {
+            right = right.join(Extent::one(&part));
+        }
     }
-    Some((on_left, sides))
+    Some((on_left, [left, right]))
 }
