@@ -18,6 +18,7 @@
 mod batch;
 mod bundle;
 mod columns;
+mod dead;
 mod density;
 mod edges;
 mod engine;
@@ -194,7 +195,7 @@ impl<'a> Job<'a> {
                 continue;
             }
             if let First::Dead = look {
-                self.leave::<SETS>(first);
+                self.missed(first);
                 continue;
             }
             let scattered = matches!(look, First::Scattered);

@@ -5,13 +5,13 @@ use glam::DVec3;
 
 use super::batch::{Batch, Planes};
 use super::bundle::Bundle;
+use super::dead::store;
 use super::exact::Exact;
 use super::groups::{Group, Groups, NO_SLOT};
 use super::held::{Line, Plane};
 use super::shapes;
 use super::{Mask, V, select};
 use crate::lanes::chosen::merge;
-use crate::lanes::past::store_past;
 use crate::lanes::words::{below, positions};
 use crate::lanes::{LaneMask, Lanes, f64x8, map3};
 use crate::ray::{HitPacket, Hits, INVALID_ID};
@@ -230,11 +230,7 @@ impl Groups {
     pub fn store_own(&self, g: usize, bundle: &Bundle, hits: &mut Hits<f32>, past: bool) {
         let (found, t, u, v) = self.own_numbers(g, bundle);
         let first = bundle.first + g * V::N;
-        let store = |x: &[u32; 16], to: &mut [u32]| match to[first..].first_chunk_mut() {
-            Some(to) if past => store_past(x, to),
-            Some(to) => *to = *x,
-            None => {}
-        };
+        let store = |x: &[u32; 16], to: &mut [u32]| store(x, to, first, past);
         let t = select(found, t, V::splat(f32::INFINITY));
         for (x, to) in [(t, &mut hits.t), (u, &mut hits.u), (v, &mut hits.v)] {
             store(&bytemuck::cast(x.to_array()), bytemuck::cast_slice_mut(to));
