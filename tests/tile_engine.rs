@@ -236,7 +236,7 @@ fn blocks_of_all_sorts_in_one_batch() {
             find(name).intersect(&scene, &block, &mut alone, &mut scratch, None);
             find(name).occluded(&scene, &block, &mut alone_any, &mut scratch, None);
             for k in 0..block.len() {
-                let bits = |h: &Hits<f32>, i: usize| (h.t[i].to_bits(), h.prim[i], h.u[i].to_bits(), h.v[i].to_bits());
+                let bits = |h: &Hits<f32>, i: usize| ([h.t[i], h.u[i], h.v[i]].map(f32::to_bits), h.prim[i], h.inst[i]);
                 assert_eq!(bits(&all, first + k), bits(&alone, k), "{name}: ray {k} of block {}", first / BLOCK);
                 assert_eq!(all_any[first + k], alone_any[k], "{name}: ray {k} of block {}", first / BLOCK);
             }
