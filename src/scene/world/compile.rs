@@ -13,7 +13,7 @@ use crate::scene::assembly::Assembly;
 use crate::scene::description::Description;
 
 impl<S: Real> World<S> {
-    /// Compiles `description` with trees as `settings` (or a [`Preset`]) say, on the current rayon pool.
+    /// Compiles `description` with trees as `settings` (or a [`Preset`](crate::bvh::Preset)) say, on the current rayon pool.
     ///
     /// # Errors
     /// Those of [`Assembly::new`].
