@@ -66,6 +66,12 @@ impl<V: Lanes> Packet<V> {
         self.dir = dir;
     }
 
+    /// Whether some of the rays `first..first + N` of a batch has a segment: without reading where they are.
+    #[inline(always)]
+    pub fn has_segment(rays: &Rays<V::Scalar>, first: usize) -> bool {
+        V::load(&rays.t_min[first..]).cmp_le(V::load(&rays.t_max[first..])).any()
+    }
+
     /// Rays `first..first + N` of a batch, their `t_max`, and the lanes that are live.
     #[inline(always)]
     pub fn load(rays: &Rays<V::Scalar>, first: usize) -> (Self, V, u32) {

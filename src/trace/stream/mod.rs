@@ -201,7 +201,7 @@ impl<S: Real> Job<'_, S> {
     #[inline(always)]
     fn among_triangles<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
         self.ask::<V>(at + AHEAD * V::N);
-        if !self.has_segment::<V>(at) {
+        if !Packet::<V>::has_segment(self.rays, at) {
             if let Output::Closest(hits) = &mut self.output {
                 HitPacket::new(V::constant(f64::INFINITY)).store(hits, at);
             }
@@ -214,19 +214,13 @@ impl<S: Real> Job<'_, S> {
         self.sort(at, &packet, t_max, live)
     }
 
-    /// Whether some ray of the vector at `at` has a segment.
-    #[inline(always)]
-    fn has_segment<V: Lanes<Scalar = S>>(&self, at: usize) -> bool {
-        V::load(&self.rays.t_min[at..]).cmp_le(V::load(&self.rays.t_max[at..])).any()
-    }
-
     /// Asks the memory for the rays of the vector at `at`, and for the ends of those that come as long after it; of rays without a
     /// segment nothing else is read.
     #[inline(always)]
     fn ask<V: Lanes<Scalar = S>>(&self, at: usize) {
         let rays = self.rays;
         [&rays.t_min, &rays.t_max].into_iter().for_each(|column| prefetch(column, at + AHEAD * V::N));
-        if at + V::N <= rays.padded_len() && self.has_segment::<V>(at) {
+        if at + V::N <= rays.padded_len() && Packet::<V>::has_segment(rays, at) {
             rays.org.iter().chain(&rays.dir).for_each(|column| prefetch(column, at));
         }
     }

@@ -3,16 +3,10 @@
 
 use super::bundle::groups;
 use super::{Job, SETS, V};
+use crate::lanes::Lanes;
 use crate::lanes::past::store_past;
-use crate::lanes::{LaneMask, Lanes};
-use crate::ray::{INVALID_ID, Rays};
+use crate::ray::INVALID_ID;
 use crate::trace::output::Output;
-
-/// Whether some ray of the group that starts with ray `first` has a segment.
-#[inline(always)]
-pub fn has_segment(rays: &Rays<f32>, first: usize) -> bool {
-    V::load(&rays.t_min[first..]).cmp_le(V::load(&rays.t_max[first..])).any()
-}
 
 /// Writes a group's numbers from place `first` of a column on. `past`: past the caches.
 #[inline(always)]

@@ -3,7 +3,6 @@
 
 use super::bundle::{Bundle, Passing, Shared, Source, TAME, groups};
 use super::columns::Segments;
-use super::dead::has_segment;
 use super::{GROUPS, SETS, V};
 use crate::lanes::{LaneMask, Lanes, Lanes3, each};
 use crate::ray::{Packet, Rays};
@@ -31,7 +30,7 @@ impl<'a> First<'a> {
     #[inline(never)]
     pub fn of(rays: &'a Rays<f32>, first: usize, any: bool) -> Self {
         let len = groups::<SETS>(rays, first);
-        for g in (0..len).filter(|g| has_segment(rays, first + g * V::N)) {
+        for g in (0..len).filter(|g| Packet::<V>::has_segment(rays, first + g * V::N)) {
             let mut group = Bundle::unsorted(rays, first + g * V::N, 1);
             group.sort_group(rays, 0);
             let [tame, odd] = [group.tame[0], group.odd[0]];
