@@ -8,6 +8,7 @@
 //! with); Boulos, Wald, Shirley, "Geometric and Arithmetic Culling Methods for Entire Ray Packets", 2006.
 
 use super::Job;
+use super::patience::Patience;
 use crate::bvh::{Bundle, Child, Tree, WIDTH};
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each, map3};
 use crate::ray::slab::Interval;
@@ -22,8 +23,7 @@ pub const SIZES: [usize; 2] = [16, 4];
 /// Leaves that a block may meet.
 const MOST: usize = 32;
 
-/// After a block that met too much the next one of its size is left alone, after another failure the next two, then twice as
-/// many each time, up to this many.
+/// Most blocks that are left alone after those of their size met too much.
 const PATIENCE: u32 = 16;
 
 /// A leaf that some rays may meet.
@@ -42,34 +42,20 @@ struct Listed<S> {
 pub struct Block<S> {
     list: Vec<Listed<S>>,
     waiting: Vec<u32>,
-    /// For each size: blocks still to be left alone, and how many more if the next one meets too much.
-    patience: [(u32, u32); SIZES.len()],
+    /// For each size: when to try the next one.
+    patience: [Patience<PATIENCE>; SIZES.len()],
 }
 
 impl<S> Default for Block<S> {
     fn default() -> Self {
-        Self { list: Vec::new(), waiting: Vec::new(), patience: [(0, 1); SIZES.len()] }
+        Self { list: Vec::new(), waiting: Vec::new(), patience: Default::default() }
     }
 }
 
 impl<S> Block<S> {
     /// Forgets what earlier calls found.
     pub fn start(&mut self) {
-        self.patience = [(0, 1); SIZES.len()];
-    }
-
-    /// Whether to try a block of size `size`.
-    fn is_worth_trying(&mut self, size: usize) -> bool {
-        let (rest, _) = &mut self.patience[size];
-        let try_it = *rest == 0;
-        *rest = rest.saturating_sub(1);
-        try_it
-    }
-
-    /// Remembers how it went.
-    fn remember(&mut self, size: usize, went_well: bool) {
-        let (rest, next) = &mut self.patience[size];
-        (*rest, *next) = if went_well { (0, 1) } else { (*next, (*next * 2).min(PATIENCE)) };
+        self.patience = Default::default();
     }
 }
 
@@ -137,9 +123,9 @@ impl<S: Real> Job<'_, S> {
         starts: &[usize],
         size: usize,
     ) -> usize {
-        if starts.len() > 1 && self.memory.block.is_worth_trying(size) {
+        if starts.len() > 1 && self.memory.block.patience[size].is_over() {
             let done = self.whole::<V, ANY, COUNT>(starts);
-            self.memory.block.remember(size, done);
+            self.memory.block.patience[size].remember(done);
             if done {
                 return 0;
             }

@@ -2,6 +2,7 @@
 
 use super::bounds::Bounds;
 use super::node::DENSE;
+use super::region::{Extent, Region};
 use crate::lanes::rows::{ROW, Row, from_rows};
 use crate::lanes::words::transpose_bits;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, map3};
@@ -43,6 +44,8 @@ pub struct Chunk<S> {
     pub t_min: [S; RAYS],
     /// See [`Packet::t_floor`].
     pub t_floor: [S; RAYS],
+    /// Octant of each ray (with `region`).
+    pub octant: [u8; RAYS],
     /// Dominant axis of each ray.
     pub axis: [u8; RAYS],
     /// Rays with each dominant axis.
@@ -57,6 +60,8 @@ pub struct Chunk<S> {
     pub len: usize,
     /// Bounds over all of them, if they are of one octant.
     pub bounds: Option<Bounds<S>>,
+    /// Where they all lie, if they go together whatever their octants.
+    pub region: Option<Region<S>>,
 }
 
 impl<S: Real> Default for Chunk<S> {
@@ -71,6 +76,7 @@ impl<S: Real> Default for Chunk<S> {
             shear: [zero; 3],
             t_min: zero,
             t_floor: zero,
+            octant: [0; RAYS],
             axis: [0; RAYS],
             dominant: [0; 3],
             flat: false,
@@ -78,6 +84,7 @@ impl<S: Real> Default for Chunk<S> {
             mean: [S::ZERO; 3],
             len: 0,
             bounds: None,
+            region: None,
         }
     }
 }
@@ -134,18 +141,22 @@ impl<S: Real> Chunk<S> {
         rays: Set,
     ) -> Set {
         self.start(from.len);
+        let together = from.region.is_some();
         let mut inside = 0;
         if rays.count_ones() <= FEW {
-            let mut rest = rays;
+            let (mut rest, mut extent) = (rays, Extent::none());
             while rest != 0 {
                 let i = rest.trailing_zeros() as usize & (RAYS - 1);
                 rest &= rest - 1;
-                inside |= self.enter_vector::<S>(from, instance, t, i, 1);
+                inside |= self.enter_vector::<S>(from, instance, t, (i, 1), &mut extent);
             }
+            self.region = together.then(|| extent.region());
         } else {
+            let mut extent = Extent::<V>::none();
             for at in (0..self.len).step_by(V::N) {
-                inside |= self.enter_vector::<V>(from, instance, t, at, (rays >> at) as u32 & V::ALL);
+                inside |= self.enter_vector(from, instance, t, (at, (rays >> at) as u32 & V::ALL), &mut extent);
             }
+            self.region = together.then(|| extent.region());
         }
         inside
     }
@@ -156,8 +167,8 @@ impl<S: Real> Chunk<S> {
         from: &Self,
         instance: &Instance<S>,
         t: &[S; RAYS],
-        at: usize,
-        lanes: u32,
+        (at, lanes): (usize, u32),
+        extent: &mut Extent<V>,
     ) -> Set {
         if lanes == 0 {
             return 0;
@@ -168,14 +179,20 @@ impl<S: Real> Chunk<S> {
         if meets == 0 {
             return 0;
         }
-        self.take(at, &packet.into_local(&instance.to_local, interval.near));
+        let local = packet.into_local(&instance.to_local, interval.near);
+        self.take(at, &local);
+        if from.region.is_some() {
+            self.take_octants(at, &local);
+            extent.add(local.org, local.dir, [local.t_min, V::load(&t[at..])], meets);
+        }
         Set::from(meets) << at
     }
 
     /// Starts anew, with `len` rays to come.
     #[inline(always)]
     pub fn start(&mut self, len: usize) {
-        (self.len, self.bounds, self.flat, self.steep) = (len.min(RAYS), None, false, false);
+        (self.len, self.bounds, self.region) = (len.min(RAYS), None, None);
+        (self.flat, self.steep) = (false, false);
     }
 
     /// Takes in a vector of rays.
@@ -185,6 +202,13 @@ impl<S: Real> Chunk<S> {
         store3(packet.dir, &mut self.dir, at);
         packet.t_min.store(&mut self.t_min[at..]);
         self.put(at, packet);
+    }
+
+    /// Notes the octants of a vector of rays.
+    #[inline(always)]
+    pub fn take_octants<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>) {
+        let down = map3(packet.rcp, |r| r.cmp_lt(V::constant(0.0)).bits());
+        self.octant[at..at + V::N].copy_from_slice(&transpose_bits(down)[..V::N]);
     }
 
     /// About that: entries after the last ray count too, as far as the vectors go.

@@ -19,7 +19,11 @@ mod bounds;
 mod chunk;
 mod due;
 mod leaf;
+mod mixed;
+mod neighbours;
 mod node;
+mod patience;
+mod region;
 mod visitors;
 mod walk;
 
@@ -71,6 +75,7 @@ pub struct Memory<S> {
     waiting: walk::Pile<S>,
     closer: leaf::Closer<S>,
     block: Block<S>,
+    savings: neighbours::Savings,
 }
 
 impl<S: Real> Default for Memory<S> {
@@ -86,6 +91,7 @@ impl<S: Real> Default for Memory<S> {
             waiting: walk::Pile::default(),
             closer: leaf::Closer::default(),
             block: Block::default(),
+            savings: neighbours::Savings::default(),
         }
     }
 }
@@ -147,14 +153,24 @@ impl<S: Real> Job<'_, S> {
         if self.world.is_of_shapes() {
             self.blocks::<V, ANY, COUNT>(starts);
         } else {
-            let mut sorted = 0;
+            let (mut sorted, mut some, mut count) = (0, [0; RAYS], 0);
+            let many = if ANY { RAYS / V::N } else { 1 };
             for at in starts {
-                sorted += self.among_triangles::<V, ANY, COUNT>(at);
-                if sorted + V::N > SOURCE {
+                if self.is_dead::<V>(at) {
+                    continue;
+                }
+                some[count] = at;
+                count += 1;
+                if count == many {
+                    sorted += self.among_triangles::<V, ANY, COUNT>(&some[..count]);
+                    count = 0;
+                }
+                if sorted + many * V::N > SOURCE {
                     self.sorted::<V, ANY, COUNT>();
                     sorted = 0;
                 }
             }
+            self.among_triangles::<V, ANY, COUNT>(&some[..count]);
         }
         self.sorted::<V, ANY, COUNT>();
     }
@@ -196,17 +212,30 @@ impl<S: Real> Job<'_, S> {
         self.sort(at, &packet, t_max, live)
     }
 
+    /// Whether no ray of a vector has a segment; then says that they meet nothing.
+    #[inline(always)]
+    fn is_dead<V: Lanes<Scalar = S>>(&mut self, at: usize) -> bool {
+        self.ask::<V>(at + AHEAD * V::N);
+        let dead = !Packet::<V>::has_segment(self.rays, at);
+        if dead && let Output::Closest(hits) = &mut self.output {
+            HitPacket::new(V::constant(f64::INFINITY)).store(hits, at);
+        }
+        dead
+    }
+
+    /// Traces vectors of rays, if they are neighbours or point nearly the same way, or sorts them. Returns how many were sorted.
+    #[inline(always)]
+    fn among_triangles<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, starts: &[usize]) -> usize {
+        match ANY {
+            true => self.neighbours::<V, COUNT>(starts),
+            false => starts.iter().map(|&at| self.alike::<V, ANY, COUNT>(at)).sum(),
+        }
+    }
+
     /// Traces a vector of rays that point nearly the same way as a packet, or sorts its live rays. Returns how many were
     /// sorted.
     #[inline(always)]
-    fn among_triangles<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
-        self.ask::<V>(at + AHEAD * V::N);
-        if !Packet::<V>::has_segment(self.rays, at) {
-            if let Output::Closest(hits) = &mut self.output {
-                HitPacket::new(V::constant(f64::INFINITY)).store(hits, at);
-            }
-            return 0;
-        }
+    fn alike<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
         let (packet, t_max, live) = self.load::<V, COUNT>(at);
         if live != 0 && !self.apart && Signs::of(&packet).agree(live) && self.packet::<V, ANY, COUNT>(at, live) {
             return 0;

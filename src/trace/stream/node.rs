@@ -17,7 +17,7 @@ pub struct Met<S, const W: usize> {
     /// Children that some ray meets, as bits.
     pub children: u32,
     /// Rays that meet each child: of the first and of the second 64 of the chunk.
-    halves: [[u64; W]; 2],
+    pub halves: [[u64; W]; 2],
     /// Order of the children.
     pub near: [S; W],
     /// Whether `near` is where the first ray enters.
@@ -36,7 +36,7 @@ impl<S, const W: usize> Met<S, W> {
 pub type Planes<'a, S, const W: usize> = [(&'a [S; W], &'a [S; W]); 3];
 
 #[inline(always)]
-fn planes<S, const W: usize>(node: &Node<S, W>, octant: usize) -> Planes<'_, S, W> {
+pub fn planes<S, const W: usize>(node: &Node<S, W>, octant: usize) -> Planes<'_, S, W> {
     each(|axis| {
         let [low, high] = &node.bounds[axis];
         if octant >> axis & 1 == 0 { (low, high) } else { (high, low) }
@@ -87,7 +87,7 @@ fn sparse<E: Lanes, const W: usize, const ANY: bool>(
 
 /// `test(i)`: which children ray `i` meets, and where it enters them.
 #[inline(always)]
-fn one_by_one<E: Lanes, const W: usize, const ANY: bool>(
+pub fn one_by_one<E: Lanes, const W: usize, const ANY: bool>(
     rays: Set,
     test: impl Fn(usize) -> (E::Mask, E),
 ) -> Met<E::Scalar, W> {
@@ -119,7 +119,7 @@ type Boxes<E> = [(E, E); 3];
 
 /// The box test of all engines.
 #[inline(always)]
-fn exact<E: Lanes>(planes: &Boxes<E>, chunk: &Chunk<E::Scalar>, t: &[E::Scalar; RAYS], ray: usize) -> (E::Mask, E) {
+pub fn exact<E: Lanes>(planes: &Boxes<E>, chunk: &Chunk<E::Scalar>, t: &[E::Scalar; RAYS], ray: usize) -> (E::Mask, E) {
     let [x, y, z] = each(|a| {
         let (org, rcp) = (E::splat(chunk.org[a][ray]), E::splat(chunk.rcp[a][ray]));
         ((planes[a].0 - org) * rcp, (planes[a].1 - org) * rcp)
@@ -140,7 +140,7 @@ const WIDER: f64 = 12.0;
 /// [`exact`] or more, in half the operations: planes times reciprocals less what the origin contributes, fused. It may meet boxes
 /// that `exact` just misses, and never the other way round.
 #[inline(always)]
-fn quick<E: Lanes>(planes: &Boxes<E>, chunk: &Chunk<E::Scalar>, t: &[E::Scalar; RAYS], ray: usize) -> (E::Mask, E) {
+pub fn quick<E: Lanes>(planes: &Boxes<E>, chunk: &Chunk<E::Scalar>, t: &[E::Scalar; RAYS], ray: usize) -> (E::Mask, E) {
     let [x, y, z] = each(|a| {
         let rcp = E::splat(chunk.rcp[a][ray]);
         let [near, far] = [0, 1].map(|end: usize| E::splat(chunk.shift[end][a][ray]));

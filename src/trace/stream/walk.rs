@@ -3,7 +3,7 @@
 use super::best::Best;
 use super::chunk::{Chunk, RAYS, Set};
 use super::due::{self, Due};
-use super::{leaf, node};
+use super::{leaf, mixed, node};
 use crate::bvh::{Child, Node, Tree, WIDE, WIDTH};
 use crate::lanes::words::prefetch_either;
 use crate::lanes::{LaneMask, Lanes, Real};
@@ -76,6 +76,8 @@ pub struct Walk<'a, S> {
     pub due: Due,
     /// Whether none is to wait.
     pub at_once: bool,
+    /// Tests of nodes' boxes, of rays of any octants.
+    pub tests: u32,
 }
 
 impl<'a, S: Real> Walk<'a, S> {
@@ -87,7 +89,7 @@ impl<'a, S: Real> Walk<'a, S> {
         stack: &'a mut Stack<S>,
         counters: &'a mut Counters,
     ) -> Self {
-        Self { best, waiting, closer, stack, counters, due: Due::default(), at_once: false }
+        Self { best, waiting, closer, stack, counters, due: Due::default(), at_once: false, tests: 0 }
     }
 
     /// Traces a chunk of one octant through the whole world. `local` is room for the chunk in an instance's space.
@@ -113,7 +115,12 @@ impl<'a, S: Real> Walk<'a, S> {
             let inst = world.top_leaves[if is_leaf { at } else { 0 }] as usize;
             if is_leaf { inst } else { at }
         };
-        self.tree::<V, _, ANY, COUNT>(&world.top, chunk, (all, octant), (&world.instances, at), leaf);
+        match ANY && chunk.region.is_some() {
+            true => self.tree::<V, _, ANY, COUNT, true>(&world.top, chunk, (all, octant), (&world.instances, at), leaf),
+            false => {
+                self.tree::<V, _, ANY, COUNT, false>(&world.top, chunk, (all, octant), (&world.instances, at), leaf)
+            }
+        }
         for &inst in &world.unbounded_instances {
             self.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, all);
         }
@@ -146,6 +153,10 @@ impl<'a, S: Real> Walk<'a, S> {
         local: &Chunk<S>,
         rays: Set,
     ) {
+        if local.region.is_some() {
+            self.object::<V, ANY, COUNT>(object, inst, local, rays, 0);
+            return;
+        }
         let mut rest = rays;
         while rest != 0 {
             let (octant, alike) = local.first_octant::<V>(rest);
@@ -154,7 +165,25 @@ impl<'a, S: Real> Walk<'a, S> {
         }
     }
 
+    /// Takes rays of one octant, or of any if the chunk has a region, through an object.
+    #[inline(always)]
     fn object<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
+        &mut self,
+        object: &Object<S>,
+        inst: u32,
+        chunk: &Chunk<S>,
+        rays: Set,
+        octant: usize,
+    ) {
+        match ANY && chunk.region.is_some() {
+            true => self.within::<V, ANY, COUNT, true>(object, inst, chunk, rays, octant),
+            false => self.within::<V, ANY, COUNT, false>(object, inst, chunk, rays, octant),
+        }
+    }
+
+    /// See [`Walk::object`]; `MIXED`: of any octants.
+    #[inline(never)]
+    fn within<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool, const MIXED: bool>(
         &mut self,
         object: &Object<S>,
         inst: u32,
@@ -169,7 +198,7 @@ impl<'a, S: Real> Walk<'a, S> {
         }
         self.at_once = rays.count_ones() < due::LEAST;
         let at = |child: Child| child.index as usize;
-        self.tree::<V, _, ANY, COUNT>(
+        self.tree::<V, _, ANY, COUNT, MIXED>(
             &object.tree,
             chunk,
             (rays, octant),
@@ -186,7 +215,7 @@ impl<'a, S: Real> Walk<'a, S> {
     /// Traverses `tree` with some rays of one octant. `leaves`: what leaves refer to, and at which place of it or of the nodes what a
     /// child refers to lies, so that the memory is asked for it in time.
     #[inline(always)]
-    fn tree<V: Lanes<Scalar = S>, T, const ANY: bool, const COUNT: bool>(
+    fn tree<V: Lanes<Scalar = S>, T, const ANY: bool, const COUNT: bool, const MIXED: bool>(
         &mut self,
         tree: &Tree<S>,
         chunk: &Chunk<S>,
@@ -195,15 +224,23 @@ impl<'a, S: Real> Walk<'a, S> {
         leaf: impl FnMut(&mut Self, Child, Set),
     ) {
         if const { S::Children::N == WIDE } {
-            self.nodes::<V, S::Children, T, WIDE, ANY, COUNT>(&tree.wide, chunk, of, leaves, leaf);
+            self.nodes::<V, S::Children, T, WIDE, ANY, COUNT, MIXED>(&tree.wide, chunk, of, leaves, leaf);
         } else {
-            self.nodes::<V, S::Octo, T, WIDTH, ANY, COUNT>(&tree.nodes, chunk, of, leaves, leaf);
+            self.nodes::<V, S::Octo, T, WIDTH, ANY, COUNT, MIXED>(&tree.nodes, chunk, of, leaves, leaf);
         }
     }
 
     /// See [`Walk::tree`]; `E`: vectors of the `W` children of `nodes`.
     #[inline(always)]
-    fn nodes<V: Lanes<Scalar = S>, E: Lanes<Scalar = S>, T, const W: usize, const ANY: bool, const COUNT: bool>(
+    fn nodes<
+        V: Lanes<Scalar = S>,
+        E: Lanes<Scalar = S>,
+        T,
+        const W: usize,
+        const ANY: bool,
+        const COUNT: bool,
+        const MIXED: bool,
+    >(
         &mut self,
         nodes: &[Node<S, W>],
         chunk: &Chunk<S>,
@@ -230,7 +267,11 @@ impl<'a, S: Real> Walk<'a, S> {
                     self.counters.node_lanes_active += u64::from(rays.count_ones());
                     self.counters.node_lanes_total += RAYS as u64;
                 }
-                let met = node::meet::<V, E, W, ANY>(node, chunk, &self.best.t, rays, octant);
+                let t = &self.best.t;
+                let met = match &chunk.region {
+                    Some(region) if MIXED => mixed::meet::<V, E, W>(node, chunk, region, t, rays, &mut self.tests),
+                    _ => node::meet::<V, E, W, ANY>(node, chunk, t, rays, octant),
+                };
                 if met.children != 0 {
                     (child, rays) = self.choose::<E, W, ANY>(node, &met, &fetch);
                     continue;

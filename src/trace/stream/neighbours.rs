@@ -1,0 +1,75 @@
+//! Neighbours: any-hit rays that are so short that those of neighbouring pixels, whatever their directions, have most of the upper
+//! nodes in common, such as those of ambient occlusion. They go down the tree as they come; to sort them would take a third of the
+//! time of all.
+
+use super::patience::Patience;
+use super::region::Extent;
+use super::{Job, Memory, walk};
+use crate::lanes::{Lanes, Real};
+use crate::ray::Packet;
+
+/// Tests of nodes' boxes per ray from which on it repays to sort them.
+const MOST: u32 = 2;
+
+/// For how many rays whose tests are all saved a chunk may take more.
+const SAVED: u32 = 1024;
+
+/// Most chunks that are sorted after some that it did not repay to leave as they were.
+const PATIENCE: u32 = 64;
+
+/// Whether to sort the next chunk or not: what those before have shown.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Savings {
+    /// Tests that the last ones needed less than sorting them is worth.
+    saved: u32,
+    patience: Patience<PATIENCE>,
+}
+
+impl Savings {
+    /// Remembers what a chunk of `rays` took.
+    fn remember(&mut self, tests: u32, rays: u32) {
+        let (left, full) = ((self.saved + MOST * rays).checked_sub(tests), MOST * SAVED);
+        self.saved = left.unwrap_or(0).min(full);
+        // One chunk that does well says little.
+        if left.is_none_or(|left| left >= full) {
+            self.patience.remember(left.is_some());
+        }
+    }
+}
+
+impl<S: Real> Job<'_, S> {
+    /// Traces the vectors of rays that start at `starts`, any-hit, or sorts them. Returns how many were sorted.
+    pub fn neighbours<V: Lanes<Scalar = S>, const COUNT: bool>(&mut self, starts: &[usize]) -> usize {
+        if starts.is_empty() {
+            return 0;
+        }
+        if !self.memory.savings.patience.is_over() {
+            return starts.iter().map(|&at| self.alike::<V, true, COUNT>(at)).sum();
+        }
+        let Memory { chunk, local, best, waiting, closer, savings, .. } = &mut *self.memory;
+        chunk.start(starts.len() * V::N);
+        let (mut extent, mut dead) = (Extent::<V>::none(), 0);
+        for (k, &at) in starts.iter().enumerate() {
+            let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
+            t_max.store(&mut best.t[k * V::N..]);
+            chunk.take(k * V::N, &packet);
+            chunk.take_octants(k * V::N, &packet);
+            extent.add(packet.org, packet.dir, [packet.t_min, t_max], live);
+            dead |= u128::from(!live & V::ALL) << (k * V::N);
+        }
+        chunk.region = Some(extent.region());
+        best.done = dead;
+        let rays = chunk.len as u32 - dead.count_ones();
+        if COUNT {
+            self.counters.rays += u64::from(rays);
+        }
+        let mut walk = walk::Walk::new(best, (waiting, closer), self.stack, self.counters);
+        walk.world::<V, true, COUNT>(self.world, chunk, local, 0);
+        savings.remember(walk.tests, rays);
+        let done = best.done & !dead;
+        for (k, &at) in starts.iter().enumerate() {
+            self.output.put_any(at, V::N, (done >> (k * V::N)) as u32 & V::ALL);
+        }
+        0
+    }
+}
