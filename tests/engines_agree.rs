@@ -115,3 +115,53 @@ fn f32_blocks_of_coherent_rays_among_shapes() {
 fn f64_blocks_of_coherent_rays_among_shapes() {
     coherent_rays_among_shapes::<f64>();
 }
+
+/// Any-hit rays of neighbouring pixels from a surface, in all directions: `length` long, by directions of length one, tiny, huge,
+/// along an axis, with segments that begin before or behind their origin.
+fn short<S: Engines>(n: usize, seed: u64, length: f64) -> Rays<S> {
+    let mut r = common::Random(seed);
+    let mut rays = Rays::new(n);
+    let (middle, across, along) = (r.in_cube() * 3.0, r.direction(), r.direction());
+    for i in 0..n {
+        let (x, y) = lanecast::camera::morton_decode(i as u32);
+        let org = middle + (across * f64::from(x) + along * f64::from(y)) * 0.02;
+        let mut dir = r.direction();
+        let mut long = length;
+        match i % 64 {
+            9 => dir.y = 0.0,
+            17 => dir = glam::DVec3::NEG_X,
+            23 => dir.z = 1e-39,
+            33 => (dir, long) = (dir * 1e-12, long * 1e12),
+            41 => (dir, long) = (dir * 1e12, long * 1e-12),
+            _ => {}
+        }
+        let t_min = match i % 97 {
+            5 => -0.5 * long,
+            29 => 0.5 * long,
+            77 => 2.0 * long,
+            _ => 0.0,
+        };
+        let exact = |v: glam::DVec3| v.as_vec3().to_array().map(|x| S::from_f64(f64::from(x)));
+        rays.set(i, exact(org), exact(dir), S::from_f64(f64::from(t_min as f32)), S::from_f64(f64::from(long as f32)));
+    }
+    rays
+}
+
+fn short_rays_of_neighbours<S: Engines>() {
+    let mut hits = 0;
+    for seed in 0..24 {
+        let world = World::<S>::compile(&common::zoo(seed % 6, seed % 2 == 1), Preset::Balanced).unwrap();
+        hits += same_bits_of(&world, &short::<S>(1000, seed, [0.1, 0.5, 2.0][(seed % 3) as usize]));
+    }
+    assert!((2000..20_000).contains(&hits), "{hits} rays hit");
+}
+
+#[test]
+fn f32_short_rays_of_neighbours() {
+    short_rays_of_neighbours::<f32>();
+}
+
+#[test]
+fn f64_short_rays_of_neighbours() {
+    short_rays_of_neighbours::<f64>();
+}

@@ -73,3 +73,52 @@ impl<S: Real> Job<'_, S> {
         0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Stream;
+    use super::*;
+    use crate::camera::morton_decode;
+    use crate::lanes::f32x16;
+    use crate::ray::{Hits, Rays};
+    use crate::scene::load::{LoadOptions, load};
+    use crate::scene::world::{Preset, World};
+    use crate::trace::{Engine, Scratch, engine};
+    use std::marker::PhantomData;
+
+    /// Rays of a length in all directions from where a camera above a terrain sees it: how many meet something, and what the engine
+    /// has saved then.
+    fn from_the_ground(length: f32) -> (usize, u32) {
+        let scene = load("builtin:terrain", &LoadOptions::default()).unwrap();
+        let world = World::<f32>::compile(&scene, Preset::Balanced).unwrap();
+        let mut rays = Rays::<f32>::new(64 * 64);
+        let place = |i: usize| {
+            let (x, y) = morton_decode(i as u32);
+            [x as f32 * 0.01 - 0.3, 9.0, y as f32 * 0.01 - 0.3]
+        };
+        for i in 0..rays.len() {
+            rays.set(i, place(i), [0.0, -1.0, 0.0], 0.0, f32::INFINITY);
+        }
+        let (mut scratch, mut hits) = (Scratch::default(), Hits::default());
+        let (scalar, stream) = (engine::<f32>("scalar").unwrap(), Stream::<f32x16>(PhantomData));
+        scalar.intersect(&world, &rays, &mut hits, &mut scratch, None);
+        for i in 0..rays.len() {
+            let ([x, y, z], turn) = (place(i), i as f32 * 2.4);
+            let up = (i * 7 % 64) as f32 / 64.0;
+            let dir = [turn.cos() * length, up * length, turn.sin() * length];
+            rays.set(i, [x, y - hits.t[i] + 1e-3, z], dir, 0.0, 1.0);
+        }
+        let (mut got, mut want) = (Vec::new(), Vec::new());
+        stream.occluded(&world, &rays, &mut got, &mut scratch, None);
+        scalar.occluded(&world, &rays, &mut want, &mut scratch, None);
+        assert_eq!(got, want);
+        (got.iter().filter(|&&met| met == 1).count(), scratch.single.stream.savings.saved)
+    }
+
+    #[test]
+    fn short_rays_repay_it_and_long_ones_do_not() {
+        let (short, long) = (from_the_ground(0.03), from_the_ground(100.0));
+        assert!(short.0 > 500 && long.0 > 500, "{short:?} {long:?}: some rays meet something");
+        assert!(short.1 > 0 && long.1 == 0, "{short:?} {long:?}: chunks of short rays are left as they are");
+    }
+}
