@@ -43,7 +43,7 @@ pub struct Block<S> {
     list: Vec<Listed<S>>,
     waiting: Vec<u32>,
     /// For each size: when to try the next one.
-    patience: [Patience<PATIENCE>; SIZES.len()],
+    patience: [Patience<1, PATIENCE>; SIZES.len()],
 }
 
 impl<S> Default for Block<S> {

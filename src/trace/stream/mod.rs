@@ -6,7 +6,7 @@
 //! known length replaces the branches of one ray's own traversal, which are what incoherent rays spend their time on. At a
 //! leaf likewise; where few any-hit rays meet one, they wait for those of other leaves ([`due`]). Vectors of rays that are
 //! coherent after all go to the packet kernel, unless triangles are known to be too fine for that ([`Job::apart`]); among
-//! shapes, blocks of such vectors go down the tree together. The kernels and so the hits are those of the other generic
+//! shapes, blocks of such vectors go down the tree together; short any-hit rays may go unsorted ([`neighbours`]). The kernels and so the hits are those of the other generic
 //! engines, bit by bit.
 //!
 //! Sources: Wald, Gribble, Boulos, Kensler, "SIMD Ray Stream Tracing", 2007; Tsakok, "Faster Incoherent Rays: Multi-BVH
@@ -24,6 +24,7 @@ mod neighbours;
 mod node;
 mod patience;
 mod region;
+mod signs;
 mod visitors;
 mod walk;
 
@@ -34,12 +35,13 @@ use super::query::{Query, Stack};
 use super::{Engine, Engines, Scratch, traverse};
 use crate::lanes::rows::{Row, to_rows};
 use crate::lanes::words::{prefetch, transpose_bits};
-use crate::lanes::{LaneMask, Lanes, Real, each, map3};
+use crate::lanes::{Lanes, Real};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
 use crate::scene::world::World;
 use best::Best;
 use block::Block;
 use chunk::{Chunk, RAYS};
+use signs::Signs;
 pub use visitors::{MOST, Visitors};
 
 /// Rays that are sorted together.
@@ -96,31 +98,6 @@ impl<S: Real> Default for Memory<S> {
     }
 }
 
-/// What rays are sorted by, a bit per lane: whether they go down along x, y, z, whether y and z are their dominant axes.
-struct Signs([u32; 5]);
-
-impl Signs {
-    #[inline(always)]
-    fn of<V: Lanes>(packet: &Packet<V>) -> Self {
-        // The sign of the reciprocal, without a division.
-        let [x, y, z] = map3(packet.dir, |d| d.cmp_le(V::splat(-V::Scalar::MIN_POSITIVE)).bits());
-        Self([x, y, z, packet.dominant[1], packet.dominant[2]])
-    }
-
-    /// Whether all lanes of `live` have the same bits.
-    #[inline(always)]
-    fn agree(&self, live: u32) -> bool {
-        self.0.into_iter().all(|bits| bits & live == 0 || bits & live == live)
-    }
-
-    /// Whether they have the same direction along two axes or all.
-    #[inline(always)]
-    fn nearly_agree(&self, live: u32) -> bool {
-        let [x, y, z] = each(|axis| u32::from(self.0[axis] & live == 0 || self.0[axis] & live == live));
-        x + y + z >= 2
-    }
-}
-
 /// The engine; `V`: the vectors of rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Stream<V>(pub PhantomData<fn() -> V>);
@@ -154,23 +131,27 @@ impl<S: Real> Job<'_, S> {
             self.blocks::<V, ANY, COUNT>(starts);
         } else {
             let (mut sorted, mut some, mut count) = (0, [0; RAYS], 0);
-            let many = if ANY { RAYS / V::N } else { 1 };
             for at in starts {
                 if self.is_dead::<V>(at) {
                     continue;
                 }
-                some[count] = at;
-                count += 1;
-                if count == many {
-                    sorted += self.among_triangles::<V, ANY, COUNT>(&some[..count]);
-                    count = 0;
+                if ANY && (count > 0 || self.memory.savings.are_worth_trying()) {
+                    (some[count], count) = (at, count + 1);
+                    if count == RAYS / V::N {
+                        sorted += self.neighbours::<V, COUNT>(&some[..count]);
+                        count = 0;
+                    }
+                } else {
+                    sorted += self.alike::<V, ANY, COUNT>(at);
                 }
-                if sorted + many * V::N > SOURCE {
+                if sorted + RAYS > SOURCE {
                     self.sorted::<V, ANY, COUNT>();
                     sorted = 0;
                 }
             }
-            self.among_triangles::<V, ANY, COUNT>(&some[..count]);
+            if ANY {
+                self.neighbours::<V, COUNT>(&some[..count]);
+            }
         }
         self.sorted::<V, ANY, COUNT>();
     }
@@ -221,15 +202,6 @@ impl<S: Real> Job<'_, S> {
             HitPacket::new(V::constant(f64::INFINITY)).store(hits, at);
         }
         dead
-    }
-
-    /// Traces vectors of rays, if they are neighbours or point nearly the same way, or sorts them. Returns how many were sorted.
-    #[inline(always)]
-    fn among_triangles<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, starts: &[usize]) -> usize {
-        match ANY {
-            true => self.neighbours::<V, COUNT>(starts),
-            false => starts.iter().map(|&at| self.alike::<V, ANY, COUNT>(at)).sum(),
-        }
     }
 
     /// Traces a vector of rays that point nearly the same way as a packet, or sorts its live rays. Returns how many were

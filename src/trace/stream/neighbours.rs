@@ -14,18 +14,27 @@ const MOST: u32 = 2;
 /// For how many rays whose tests are all saved a chunk may take more.
 const SAVED: u32 = 1024;
 
-/// Most chunks that are sorted after some that it did not repay to leave as they were.
-const PATIENCE: u32 = 64;
+/// How many times the surface of a region must fit into that of all there is.
+const SMALL: f64 = 4.0;
 
-/// Whether to sort the next chunk or not: what those before have shown.
+/// Fewest and most vectors of rays that are sorted after a chunk that it did not repay to leave as it was.
+const PATIENCE: [u32; 2] = [8, 512];
+
+/// Whether to sort the next rays or not: what those before have shown.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Savings {
     /// Tests that the last ones needed less than sorting them is worth.
     saved: u32,
-    patience: Patience<PATIENCE>,
+    patience: Patience<{ PATIENCE[0] }, { PATIENCE[1] }>,
 }
 
 impl Savings {
+    /// Whether to leave the next rays as they are.
+    #[inline(always)]
+    pub fn are_worth_trying(&mut self) -> bool {
+        self.patience.is_over()
+    }
+
     /// Remembers what a chunk of `rays` took.
     fn remember(&mut self, tests: u32, rays: u32) {
         let (left, full) = ((self.saved + MOST * rays).checked_sub(tests), MOST * SAVED);
@@ -38,14 +47,18 @@ impl Savings {
 }
 
 impl<S: Real> Job<'_, S> {
-    /// Traces the vectors of rays that start at `starts`, any-hit, or sorts them. Returns how many were sorted.
+    /// Traces the vectors of rays that start at `starts`, at most [`RAYS`](super::chunk::RAYS), any-hit, or sorts them. Returns how
+    /// many were sorted.
+    #[inline(never)]
     pub fn neighbours<V: Lanes<Scalar = S>, const COUNT: bool>(&mut self, starts: &[usize]) -> usize {
-        if starts.is_empty() {
-            return 0;
+        match starts.is_empty() || self.together::<V, COUNT>(starts) {
+            true => 0,
+            false => starts.iter().map(|&at| self.alike::<V, true, COUNT>(at)).sum(),
         }
-        if !self.memory.savings.patience.is_over() {
-            return starts.iter().map(|&at| self.alike::<V, true, COUNT>(at)).sum();
-        }
+    }
+
+    /// Traces vectors of rays as they come; false if they reach too far for that.
+    fn together<V: Lanes<Scalar = S>, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
         let Memory { chunk, local, best, waiting, closer, savings, .. } = &mut *self.memory;
         chunk.start(starts.len() * V::N);
         let (mut extent, mut dead) = (Extent::<V>::none(), 0);
@@ -57,20 +70,26 @@ impl<S: Real> Job<'_, S> {
             extent.add(packet.org, packet.dir, [packet.t_min, t_max], live);
             dead |= u128::from(!live & V::ALL) << (k * V::N);
         }
-        chunk.region = Some(extent.region());
+        let (region, world) = (extent.region(), self.world);
+        let all = if world.is_single_object() { world.first_object().tree.bounds } else { world.top.bounds };
+        if region.0.half_area() * SMALL > all.half_area() {
+            savings.patience.remember(false);
+            return false;
+        }
+        chunk.region = Some(region);
         best.done = dead;
         let rays = chunk.len as u32 - dead.count_ones();
         if COUNT {
             self.counters.rays += u64::from(rays);
         }
         let mut walk = walk::Walk::new(best, (waiting, closer), self.stack, self.counters);
-        walk.world::<V, true, COUNT>(self.world, chunk, local, 0);
+        walk.world::<V, true, COUNT>(world, chunk, local, 0);
         savings.remember(walk.tests, rays);
         let done = best.done & !dead;
         for (k, &at) in starts.iter().enumerate() {
             self.output.put_any(at, V::N, (done >> (k * V::N)) as u32 & V::ALL);
         }
-        0
+        true
     }
 }
 

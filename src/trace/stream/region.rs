@@ -2,6 +2,7 @@
 
 use crate::bvh::Node;
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each};
+use crate::math::Aabb;
 
 /// How far a region reaches beyond the ends of its segments, relative to its largest coordinate, in half ulps: the box test of a ray
 /// ([`crate::ray::slab`]) is off by less than five roundings, the end by two.
@@ -9,10 +10,7 @@ const SLACK: f64 = 32.0;
 
 /// A box around segments, with what the box test of a ray may be off by: a box that a ray meets by that test meets the region.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Region<S> {
-    lo: [S; 3],
-    hi: [S; 3],
-}
+pub struct Region<S>(pub Aabb<S>);
 
 impl<S: Real> Region<S> {
     /// Children of a node that meet it, as bits. `E`: vectors of `W` children.
@@ -20,7 +18,7 @@ impl<S: Real> Region<S> {
     pub fn children<E: Lanes<Scalar = S>, const W: usize>(&self, node: &Node<S, W>) -> u32 {
         let [x, y, z] = each(|a| {
             let [low, high] = &node.bounds[a];
-            E::load(low).cmp_le(E::splat(self.hi[a])) & E::splat(self.lo[a]).cmp_le(E::load(high))
+            E::load(low).cmp_le(E::splat(self.0.hi[a])) & E::splat(self.0.lo[a]).cmp_le(E::load(high))
         });
         (x & y & z).bits() & ((1 << node.used) - 1)
     }
@@ -79,7 +77,7 @@ impl<V: Lanes> Extent<V> {
                 + V::Scalar::from_f64(2.0 * Self::small());
             if plain && slack.is_finite() { [lo - slack, hi + slack] } else { everywhere }
         });
-        Region { lo: [x[0], y[0], z[0]], hi: [x[1], y[1], z[1]] }
+        Region(Aabb { lo: [x[0], y[0], z[0]], hi: [x[1], y[1], z[1]] })
     }
 }
 
@@ -88,7 +86,6 @@ mod tests {
     use super::*;
     use crate::bvh::{Child, WIDE, WIDTH};
     use crate::lanes::{f32x8, f32x16, f64x8};
-    use crate::math::Aabb;
     use crate::ray::slab::Interval;
     use crate::ray::{Packet, Rays};
 
@@ -134,7 +131,7 @@ mod tests {
             assert_eq!(meets & !children, 0, "round {round}: a ray meets a box that the region does not");
             met += meets.count_ones();
             left += children.count_ones();
-            told += u32::from(region.lo[0].is_finite() && region.hi[0].is_finite());
+            told += u32::from(region.0.is_bounded());
         }
         assert!(met > 200 && left > met && left < 600 * (W as u32 - 2) * 7 / 8, "{met} boxes met, {left} left");
         assert!((250..600).contains(&told), "{told} regions are bounded");
@@ -158,7 +155,7 @@ mod tests {
         let (packet, t_max, live) = Packet::<f32x16>::load(&rays, 0);
         let mut extent = Extent::none();
         extent.add(packet.org, packet.dir, [packet.t_min, t_max], live);
-        let Region { lo, hi } = extent.region();
+        let Aabb { lo, hi } = extent.region().0;
         for (got, want) in lo.into_iter().chain(hi).zip([0.0, 1.5, 0.0, 14.0, 2.5, 0.0]) {
             assert!((got - want).abs() <= 1e-4, "{lo:?} {hi:?}");
         }
