@@ -20,11 +20,11 @@ pub fn meet<V: Lanes, E: Lanes<Scalar = V::Scalar>, const W: usize>(
     region: &Region<V::Scalar>,
     t: &[V::Scalar; RAYS],
     rays: Set,
-    tests: &mut u32,
+    tests: &mut u64,
 ) -> Met<V::Scalar, W> {
     let children = region.children::<E, W>(node);
     let (few, many) = (BOX * children.count_ones() * chunk.len.div_ceil(V::N) as u32, rays.count_ones());
-    *tests += few.min(many);
+    *tests += u64::from(few.min(many));
     if few <= many {
         return dense::<V, W>(node, chunk, t, rays, children);
     }

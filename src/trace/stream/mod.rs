@@ -6,8 +6,8 @@
 //! known length replaces the branches of one ray's own traversal, which are what incoherent rays spend their time on. At a
 //! leaf likewise; where few any-hit rays meet one, they wait for those of other leaves ([`due`]). Vectors of rays that are
 //! coherent after all go to the packet kernel, unless triangles are known to be too fine for that ([`Job::apart`]); among
-//! shapes, blocks of such vectors go down the tree together; short any-hit rays may go unsorted ([`neighbours`]). The kernels and so the hits are those of the other generic
-//! engines, bit by bit.
+//! shapes, blocks of such vectors go down the tree together; short any-hit rays may go unsorted ([`neighbours`]). The
+//! kernels and so the hits are those of the other generic engines, bit by bit.
 //!
 //! Sources: Wald, Gribble, Boulos, Kensler, "SIMD Ray Stream Tracing", 2007; Tsakok, "Faster Incoherent Rays: Multi-BVH
 //! Ray Stream Tracing", 2009; Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray tracing kernels for modern CPU

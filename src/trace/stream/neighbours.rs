@@ -9,10 +9,10 @@ use crate::lanes::{Lanes, Real};
 use crate::ray::Packet;
 
 /// Tests of nodes' boxes per ray from which on it repays to sort them.
-const MOST: u32 = 2;
+const MOST: u64 = 2;
 
 /// For how many rays whose tests are all saved a chunk may take more.
-const SAVED: u32 = 1024;
+const SAVED: u64 = 1024;
 
 /// How many times the surface of a region must fit into that of all there is.
 const SMALL: f64 = 4.0;
@@ -24,7 +24,7 @@ const PATIENCE: [u32; 2] = [8, 512];
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Savings {
     /// Tests that the last ones needed less than sorting them is worth.
-    saved: u32,
+    saved: u64,
     patience: Patience<{ PATIENCE[0] }, { PATIENCE[1] }>,
 }
 
@@ -36,8 +36,8 @@ impl Savings {
     }
 
     /// Remembers what a chunk of `rays` took.
-    fn remember(&mut self, tests: u32, rays: u32) {
-        let (left, full) = ((self.saved + MOST * rays).checked_sub(tests), MOST * SAVED);
+    fn remember(&mut self, tests: u64, rays: u32) {
+        let (left, full) = ((self.saved + MOST * u64::from(rays)).checked_sub(tests), MOST * SAVED);
         self.saved = left.unwrap_or(0).min(full);
         // One chunk that does well says little.
         if left.is_none_or(|left| left >= full) {
@@ -107,7 +107,7 @@ mod tests {
 
     /// Rays of a length in all directions from where a camera above a terrain sees it: how many meet something, and what the engine
     /// has saved then.
-    fn from_the_ground(length: f32) -> (usize, u32) {
+    fn from_the_ground(length: f32) -> (usize, u64) {
         let scene = load("builtin:terrain", &LoadOptions::default()).unwrap();
         let world = World::<f32>::compile(&scene, Preset::Balanced).unwrap();
         let mut rays = Rays::<f32>::new(64 * 64);

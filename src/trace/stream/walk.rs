@@ -77,7 +77,7 @@ pub struct Walk<'a, S> {
     /// Whether none is to wait.
     pub at_once: bool,
     /// Tests of nodes' boxes, of rays of any octants.
-    pub tests: u32,
+    pub tests: u64,
 }
 
 impl<'a, S: Real> Walk<'a, S> {
@@ -100,7 +100,7 @@ impl<'a, S: Real> Walk<'a, S> {
         local: &mut Chunk<S>,
         octant: usize,
     ) {
-        let all = Set::MAX >> (RAYS - chunk.len);
+        let all = Set::MAX >> (RAYS - chunk.len) & if ANY { !self.best.done } else { Set::MAX };
         if world.is_single_object() {
             let object = &world.objects[world.instances[0].object as usize];
             self.object::<V, ANY, COUNT>(object, 0, chunk, all, octant);
@@ -154,7 +154,9 @@ impl<'a, S: Real> Walk<'a, S> {
         rays: Set,
     ) {
         if local.region.is_some() {
-            self.object::<V, ANY, COUNT>(object, inst, local, rays, 0);
+            if rays != 0 {
+                self.object::<V, ANY, COUNT>(object, inst, local, rays, 0);
+            }
             return;
         }
         let mut rest = rays;
