@@ -96,7 +96,6 @@ impl<S: Real> Job<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::super::Stream;
-    use super::*;
     use crate::camera::morton_decode;
     use crate::lanes::f32x16;
     use crate::ray::{Hits, Rays};
