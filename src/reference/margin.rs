@@ -10,7 +10,7 @@ use crate::scene::description::{Precision, Shape};
 
 /// K of the rule `delta = K eps scale` (see the module's head): twice what textbook f32 kernels need. Over 40000 rays
 /// in each of 15 settings (soups, needles, stretched instances, the edges of a closed sphere, from 1.5 to 10000
-/// radii away) they leave up to 1139 answers unexplained at K = 2, up to 98 at 3, one in all at 4; `tests/oracle_margin.rs`
+/// radii away) they leave up to 1139 answers unexplained at K = 2, up to 98 at 3, one in all at 4; `tests/oracle/margin.rs`
 /// repeats this with fewer rays.
 pub const MARGIN_FACTOR: f64 = 8.0;
 /// Pad of placements' boxes relative to coordinates.

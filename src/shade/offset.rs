@@ -12,7 +12,7 @@ use crate::lanes::Real;
 /// Roundings of the ray (origin, direction, t) between the true hit and ours, in units of S::EPSILON.
 pub(super) const RAY_ROUNDINGS: f64 = 16.0;
 /// Roundings of the primitive: its vertices, and their differences to the origin. A triangle that is large against
-/// its distance from the eye puts its rounding errors next to the eye. (tests/render_offsets.rs: 2 leave one hit in
+/// its distance from the eye puts its rounding errors next to the eye. (tests/render/offsets.rs: 2 leave one hit in
 /// 100 behind a surface, 4 one in 10^5.)
 pub(super) const PRIMITIVE_ROUNDINGS: f64 = 8.0;
 

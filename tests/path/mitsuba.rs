@@ -5,7 +5,7 @@
 //! What the two models of materials do not share is kept small by the scenes: facets of Mitsuba mask to both
 //! directions independently, ours by height, which differs below a thousandth at these widths.
 
-#[path = "path_support/neutral.rs"]
+#[path = "../path_support/neutral.rs"]
 mod neutral;
 
 use std::path::{Path, PathBuf};

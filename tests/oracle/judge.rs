@@ -1,6 +1,6 @@
 //! The judge: planted faults must be unexplained, honest rounding must be explained.
 
-mod oracle_support;
+use crate::oracle_support;
 
 use glam::{DAffine3, DVec3};
 use lanecast::reference::{EngineHit, Oracle, OracleHit, OracleRay, Verdict, Why};

@@ -1,6 +1,6 @@
 //! Lights and boundaries against formulas.
 
-mod path_support;
+use crate::path_support;
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 

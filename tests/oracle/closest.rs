@@ -1,6 +1,6 @@
 //! The oracle's closest hits: trees against brute force, ties, transforms, degenerate and pathological input.
 
-mod oracle_support;
+use crate::oracle_support;
 
 use glam::{DAffine3, DQuat, DVec3};
 use lanecast::reference::{Oracle, OracleHit, Search};

@@ -1,7 +1,7 @@
 //! Random trees of solids: all engines give the same bits, and the oracle explains every answer.
 
-mod common;
-mod solid_support;
+use crate::common;
+use crate::solid_support;
 
 use common::Random;
 use glam::{DAffine3, DVec3};

@@ -1,7 +1,7 @@
 //! White furnaces: radiance 1 from everywhere. A surface then shows its directional albedo, a body that keeps all
 //! light is invisible, and nothing is brighter than its surroundings.
 
-mod path_support;
+use crate::path_support;
 
 use glam::DVec3;
 use lanecast::scene::description::{Description, Material};

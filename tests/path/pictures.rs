@@ -1,6 +1,6 @@
 //! Whole pictures of paths: no pixel is out of bounds, threads and tiles change no bit, planes add up.
 
-mod path_support;
+use crate::path_support;
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 use lanecast::camera::{Camera, Filter, framing};

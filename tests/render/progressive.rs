@@ -1,7 +1,7 @@
 //! Pictures by blocks: each pixel is traced once per sample, a stopped picture is consistent, and the finished one has the
 //! bits of the plain render.
 
-mod common;
+use crate::common;
 
 use std::collections::HashMap;
 use std::sync::Mutex;

@@ -14,7 +14,7 @@ use lanecast::scene::world::{Preset, World};
 use lanecast::trace::{Scratch, Stretch, engine, stretches};
 use rayon::prelude::*;
 
-mod brlcad_support;
+use crate::brlcad_support;
 use brlcad_support::{read_npz, shared};
 
 const SIDE: u32 = 512;

@@ -1,8 +1,8 @@
 //! Tiles through instances: meshes under rotations, uneven scales, shears, mirrors and far translations, against the
 //! scalar engine and the oracle; ties between instances; closed meshes stay closed under every map.
 
-mod common;
-mod tile_support;
+use crate::common;
+use crate::tile_support;
 
 use std::sync::Arc;
 

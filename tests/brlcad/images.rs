@@ -13,7 +13,7 @@ use lanecast::scene::world::{Preset, World};
 use lanecast::shade::Integrator;
 use lanecast::trace::Engines;
 
-mod brlcad_support;
+use crate::brlcad_support;
 use brlcad_support::shared;
 
 const SIDE: u32 = 512;

@@ -14,7 +14,7 @@ use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::world::{Preset, World};
 use lanecast::trace::{Scratch, engine};
 
-mod brlcad_support;
+use crate::brlcad_support;
 use brlcad_support::g::{Packing, Writer, doubles};
 
 /// Distance between two solids of the model.

@@ -1,7 +1,7 @@
 //! Rays that the tile engine makes itself against the same rays in memory.
 
-mod common;
-mod tile_support;
+use crate::common;
+use crate::tile_support;
 
 use std::sync::Arc;
 

@@ -4,7 +4,7 @@
 //! edge functions for triangles (Woop, Benthin, Wald, "Watertight ray/triangle intersection", 2013), the quadratic
 //! about the point nearest to the centre for spheres, slabs for boxes.
 
-mod oracle_support;
+use crate::oracle_support;
 
 use glam::{Affine3A, DAffine3, DQuat, DVec3, Vec3};
 use lanecast::reference::{EngineHit, MARGIN_FACTOR, Oracle, OracleRay, Search, Tally};

@@ -8,7 +8,7 @@ use lanecast::error::{Error, Result};
 use lanecast::scene::brlcad::regions::{Regions, walk};
 use lanecast::scene::brlcad::{Database, ObjectKind, choose_tops, parse, tops};
 
-mod common;
+use crate::common;
 use common::Random;
 
 fn shared(path: &str) -> Option<PathBuf> {

@@ -1,7 +1,6 @@
 //! Trees that mean harm: an error or an answer, no crash, no endless work.
 
-mod common;
-mod solid_support;
+use crate::solid_support;
 
 use glam::{DAffine3, DVec3};
 use lanecast::ray::Hits;

@@ -1,7 +1,7 @@
 //! Laws that hold for all solids, without a picture to compare with: on random trees, ray by ray, for all stretches inside.
 
-mod common;
-mod solid_support;
+use crate::common;
+use crate::solid_support;
 
 use common::Random;
 use glam::{DAffine3, DVec3};

@@ -1,6 +1,6 @@
 //! What materials take from pictures and from each other: textures on shapes, turned normal maps, mixtures that shine.
 
-mod path_support;
+use crate::path_support;
 
 use std::f64::consts::PI;
 use std::sync::Arc;

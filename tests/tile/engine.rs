@@ -1,8 +1,8 @@
 //! The tile engines against the scalar engine, for rays with a common origin, a common end or neither: `tile-exact` has
 //! its bits; `tile`, which has an arithmetic of its own, has its answers but where the oracle's margins explain it.
 
-mod common;
-mod tile_support;
+use crate::common;
+use crate::tile_support;
 
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! The tile's own arithmetic decides per ray and triangle: another tree over the same triangles, in which they are met in another
 //! order and beside other ones, must give the same bits.
 
-mod common;
-mod tile_support;
+use crate::common;
+use crate::tile_support;
 
 use std::sync::Arc;
 

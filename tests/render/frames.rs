@@ -1,6 +1,6 @@
 //! `render --frames`: keyed parameters move cameras and things, files are numbered, `--resume` leaves out what is there.
 
-mod binary;
+use crate::binary;
 
 use std::path::Path;
 
