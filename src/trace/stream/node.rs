@@ -17,7 +17,7 @@ pub struct Met<S, const W: usize> {
     /// Children that some ray meets, as bits.
     pub children: u32,
     /// Rays that meet each child: of the first and of the second 64 of the chunk.
-    pub halves: [[u64; W]; 2],
+    halves: [[u64; W]; 2],
     /// Order of the children.
     pub near: [S; W],
     /// Whether `near` is where the first ray enters.
@@ -58,7 +58,7 @@ pub fn meet<V: Lanes, E: Lanes<Scalar = V::Scalar>, const W: usize, const ANY: b
     {
         let children = bounds.children::<E, W>(&planes(node, octant), octant) & ((1 << node.used) - 1);
         if BOX * children.count_ones() * chunk.len.div_ceil(V::N) as u32 <= many {
-            return dense::<V, W, ANY>(node, chunk, t, rays, (octant, children));
+            return dense::<V, W, ANY, false>(node, chunk, t, rays, (octant, children));
         }
     }
     sparse::<E, W, ANY>(node, chunk, t, rays, octant)
@@ -153,10 +153,10 @@ pub fn quick<E: Lanes>(planes: &Boxes<E>, chunk: &Chunk<E::Scalar>, t: &[E::Scal
     (near.fast_max(E::splat(chunk.t_min[ray])).cmp_le(far), near)
 }
 
-/// One child of `children` after the other against vectors of rays. Not inlined: where chunks go through many instances it is
+/// One child of `children` after the other against vectors of rays, which are of `octant` or (`MIXED`) of any. Not inlined: where chunks go through many instances it is
 /// rare, and they lose a tenth of their rate to it.
 #[inline(never)]
-fn dense<V: Lanes, const W: usize, const ANY: bool>(
+pub fn dense<V: Lanes, const W: usize, const ANY: bool, const MIXED: bool>(
     node: &Node<V::Scalar, W>,
     chunk: &Chunk<V::Scalar>,
     t: &[V::Scalar; RAYS],
@@ -175,7 +175,8 @@ fn dense<V: Lanes, const W: usize, const ANY: bool>(
             for at in (64 * half..chunk.len.min(64 * half + 64)).step_by(V::N) {
                 let [x, y, z] = each(|a| {
                     let (org, rcp) = (V::load(&chunk.org[a][at..]), V::load(&chunk.rcp[a][at..]));
-                    ((corner[a].0 - org) * rcp, (corner[a].1 - org) * rcp)
+                    let (t0, t1) = ((corner[a].0 - org) * rcp, (corner[a].1 - org) * rcp);
+                    if MIXED { (t0.fast_min(t1), t0.fast_max(t1)) } else { (t0, t1) }
                 });
                 let near = x.0.fast_max(y.0).fast_max(z.0);
                 let interval = Interval { near, far: pad(x.1.fast_min(y.1).fast_min(z.1)) };
