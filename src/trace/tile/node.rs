@@ -57,31 +57,29 @@ pub struct Planes {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Level {
-    /// Largest values of the left, right, lower and upper planes over each child's box, for planes at the tile's low edge.
-    low: [[f32; WIDTH]; 4],
-    /// What is to be added for planes at its high edge.
-    step: [[f32; WIDTH]; 4],
     /// Nearest depth of each child.
     near: [f32; WIDTH],
     /// Upper half of the nearest depth's bits, from 0 on; all ones for a child that is done or not wanted.
     pub keys: [u16; WIDTH],
+    /// Groups that meet each child, as far as they looked when the node was opened.
+    met: [u64; WIDTH],
     /// The node.
     pub node: u32,
-    /// Groups that met it.
-    pub groups: u64,
 }
 
 impl Default for Level {
     fn default() -> Self {
-        Self {
-            low: [[0.0; WIDTH]; 4],
-            step: [[0.0; WIDTH]; 4],
-            near: [0.0; WIDTH],
-            keys: [u16::MAX; WIDTH],
-            node: 0,
-            groups: 0,
-        }
+        Self { near: [0.0; WIDTH], keys: [u16::MAX; WIDTH], met: [0; WIDTH], node: 0 }
     }
+}
+
+/// The planes of a tile's edges over a node's boxes.
+#[repr(C, align(64))]
+struct Sides {
+    /// Largest values of the left, right, lower and upper planes over each child's box, for planes at the tile's low edge.
+    low: [[f32; WIDTH]; 4],
+    /// What is to be added for planes at its high edge.
+    step: [[f32; WIDTH]; 4],
 }
 
 /// The key of a depth: order of keys is order of depths, coarsely.
@@ -119,9 +117,18 @@ impl Planes {
         planes
     }
 
-    /// Tests the children of `node`; returns those that are met, and fills in `level` if any is.
+    /// Tests the children of `node` against those of a tile's `N` sets of groups that met it; returns the children that some group
+    /// meets, and fills in `level` if there are any.
+    ///
+    /// All children at once, whatever will be found in the nearest: few are left out for that later, while a test by itself is
+    /// mostly waited for.
     #[inline(always)]
-    pub fn open(&self, node: &Node<f32, WIDTH>, level: &mut Level) -> u32 {
+    pub fn open<const N: usize>(
+        &self,
+        node: &Node<f32, WIDTH>,
+        (tile, groups): (&Groups, u64),
+        level: &mut Level,
+    ) -> u32 {
         let splat = <Children as Lanes>::splat;
         let zero = splat(0.0);
         let (mut sum, mut size) = ([zero; 3], [zero; 3]);
@@ -157,35 +164,58 @@ impl Planes {
         }
         let families =
             [(left_low, left_high), (right_low, right_high), (below_low, below_high), (above_low, above_high)];
+        let mut sides = Sides { low: [[0.0; WIDTH]; 4], step: [[0.0; WIDTH]; 4] };
         for (family, (low, high)) in families.into_iter().enumerate() {
-            low.store(&mut level.low[family]);
-            (high - low).store(&mut level.step[family]);
+            low.store(&mut sides.low[family]);
+            (high - low).store(&mut sides.step[family]);
         }
         let near = mz - rz;
         near.store(&mut level.near);
-        level.keys = upper_halves(near.fast_max(zero), met);
+        let (mut rest, mut kept) = (met, 0);
+        while rest != 0 {
+            let child = slot(rest.trailing_zeros());
+            rest &= rest - 1;
+            let some = groups & sides.groups_at::<N>(child, tile) & level.within_reach::<N>(child, tile);
+            level.met[child] = some;
+            kept |= u32::from(some != 0) << child;
+        }
+        level.keys = upper_halves(near.fast_max(zero), kept);
+        kept
+    }
+}
+
+impl Sides {
+    /// Groups of the first `N` sets whose rectangles meet the box of `child`.
+    #[inline(always)]
+    fn groups_at<const N: usize>(&self, child: usize, tile: &Groups) -> u64 {
+        let low = |family: usize| V::splat(self.low[family][child]);
+        let step = |family: usize| V::splat(self.step[family][child]);
+        let (low, step) = ([low(0), low(1), low(2), low(3)], [step(0), step(1), step(2), step(3)]);
+        let mut met = 0;
+        for q in 0..N {
+            let between = |family: usize, part: V| part.mul_add(step[family], low[family]);
+            // The left planes lie at the groups' least s, the right planes at their greatest; so for t.
+            let [[s0, s1], [t0, t1]] = &tile.part;
+            let least =
+                between(0, s0[q]).fast_min(between(1, s1[q])).fast_min(between(2, t0[q]).fast_min(between(3, t1[q])));
+            met |= u64::from(!signs(least) & 0xffff) << (q * SET);
+        }
         met
     }
 }
 
 impl Level {
-    /// Groups that meet the box of `child`, of those that met the node; the tile has `N` sets.
+    /// Groups of the first `N` sets that look as far as the box of `child`.
     #[inline(always)]
-    pub fn groups_at<const N: usize>(&self, child: usize, groups: &Groups) -> u64 {
-        let low = |family: usize| V::splat(self.low[family][child]);
-        let step = |family: usize| V::splat(self.step[family][child]);
-        let (low, step) = ([low(0), low(1), low(2), low(3)], [step(0), step(1), step(2), step(3)]);
+    fn within_reach<const N: usize>(&self, child: usize, tile: &Groups) -> u64 {
         let near = V::splat(self.near[child]);
-        let mut met = 0;
-        for q in 0..N {
-            let between = |family: usize, part: V| part.mul_add(step[family], low[family]);
-            // The left planes lie at the groups' least s, the right planes at their greatest; so for t.
-            let [[s0, s1], [t0, t1]] = &groups.part;
-            let least =
-                between(0, s0[q]).fast_min(between(1, s1[q])).fast_min(between(2, t0[q]).fast_min(between(3, t1[q])));
-            met |= u64::from(!signs(least) & near.cmp_le(groups.far[q]).bits()) << (q * SET);
-        }
-        met & self.groups
+        (0..N).fold(0, |met, q| met | u64::from(near.cmp_le(tile.far[q]).bits()) << (q * SET))
+    }
+
+    /// Groups of the first `N` sets that meet the box of `child`.
+    #[inline(always)]
+    pub fn groups_at<const N: usize>(&self, child: usize, tile: &Groups) -> u64 {
+        self.met[child] & self.within_reach::<N>(child, tile)
     }
 
     /// Takes a child off the list.

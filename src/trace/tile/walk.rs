@@ -4,6 +4,7 @@
 use super::batch::BATCH;
 use super::exact::Exact;
 use super::fine;
+use super::groups::Groups;
 use super::node::{self, Level, Planes, WIDTH, key, slot};
 use super::pairs::flush;
 use super::place::{self, Place};
@@ -12,7 +13,7 @@ use super::slab::Space;
 use super::{GROUPS, HALF_ULP, Memory, SET, V};
 use crate::bvh::{Child, Node, Nodes, Tree, WIDE};
 use crate::lanes::Lanes;
-use crate::lanes::words::{least_key, prefetch};
+use crate::lanes::words::{least_key, prefetch, prefetch_either};
 use crate::ray::Counters;
 use crate::scene::world::{Class, Instance, Object, World};
 use crate::shape::BLOCK;
@@ -28,8 +29,10 @@ struct View<'a> {
 
 /// What the leaves of a tree hold.
 trait Leaves<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> {
-    /// Asks the memory for what a leaf refers to.
-    fn fetch(&self, leaf: Child);
+    /// Whether leaves that are the only children of a node to visit may be visited in any order.
+    const AT_ONCE: bool;
+    /// Asks the memory for what a child refers to: a node of `nodes`, or a leaf.
+    fn fetch(&self, nodes: &[Node<f32, WIDTH>], child: Child);
     /// Whether a leaf that `groups` met is dear enough for a test of its box against single rays; `pays`: such tests have paid
     /// lately.
     fn is_dear(&self, leaf: Child, groups: u64, pays: bool) -> bool;
@@ -98,7 +101,14 @@ fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool
     let Some(root) = nodes.first() else { return };
     let mut limit = limit(memory);
     let mut depth = view.first;
-    if !open(view, leaves, root, 0, groups, &mut memory.levels[depth], counters) {
+    if !open::<N, ANY, EXACT, COUNT>(
+        view,
+        leaves,
+        (root, 0),
+        (&memory.groups, groups),
+        &mut memory.levels[depth],
+        counters,
+    ) {
         return;
     }
     loop {
@@ -128,7 +138,7 @@ fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool
         } else {
             let node = &nodes[child.index as usize];
             let below = &mut memory.levels[depth + 1];
-            if open(view, leaves, node, child.index, met, below, counters) {
+            if open::<N, ANY, EXACT, COUNT>(view, leaves, (node, child.index), (&memory.groups, met), below, counters) {
                 depth += 1;
             }
         }
@@ -152,9 +162,8 @@ fn is_of_shapes(leaf: Child) -> bool {
 fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     view: &View,
     leaves: &impl Leaves<N, ANY, EXACT, COUNT>,
-    node: &Node<f32, WIDTH>,
-    index: u32,
-    groups: u64,
+    (node, index): (&Node<f32, WIDTH>, u32),
+    (tile, groups): (&Groups, u64),
     level: &mut Level,
     counters: &mut Counters,
 ) -> bool {
@@ -166,20 +175,17 @@ fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
         counters.node_lanes_active += u64::from(groups.count_ones()) * V::N as u64;
         counters.node_lanes_total += (N * SET * V::N) as u64;
     }
-    let mut met = view.planes.open(node, level);
+    let mut met = view.planes.open::<N>(node, (tile, groups), level);
     if met == 0 {
         return false;
     }
-    (level.node, level.groups) = (index, groups);
+    level.node = index;
     // Most of them are visited, one after the other: their way from memory starts now.
+    let nodes = Nodes::<f32, WIDTH>::of_width(view.tree);
     while met != 0 {
         let child = node.child(slot(met.trailing_zeros()));
         met &= met - 1;
-        if child.is_leaf() {
-            leaves.fetch(child);
-        } else {
-            prefetch(Nodes::<f32, WIDTH>::of_width(view.tree), child.index as usize);
-        }
+        leaves.fetch(nodes, child);
     }
     true
 }
@@ -187,9 +193,11 @@ fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
 impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leaves<N, ANY, EXACT, COUNT>
     for Blocks<'_>
 {
+    const AT_ONCE: bool = true;
+
     #[inline(always)]
-    fn fetch(&self, leaf: Child) {
-        prefetch(&self.object.triangles, leaf.index as usize);
+    fn fetch(&self, nodes: &[Node<f32, WIDTH>], child: Child) {
+        prefetch_either(nodes, &self.object.triangles, child.is_leaf(), child.index as usize);
     }
 
     #[inline(always)]
@@ -226,9 +234,14 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
 impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leaves<N, ANY, EXACT, COUNT>
     for Instances<'_>
 {
+    const AT_ONCE: bool = false;
+
     #[inline(always)]
-    fn fetch(&self, leaf: Child) {
-        let inst = self.0.top_leaves[leaf.index as usize] as usize;
+    fn fetch(&self, nodes: &[Node<f32, WIDTH>], child: Child) {
+        if !child.is_leaf() {
+            return prefetch(nodes, child.index as usize);
+        }
+        let inst = self.0.top_leaves[child.index as usize] as usize;
         prefetch(&self.0.instances, inst);
         prefetch(&self.0.assembly.placements, inst);
     }
