@@ -49,7 +49,7 @@ pub struct Met {
     /// Lanes that hit the triangle.
     hit: Mask,
     /// Lanes that may: those that are no hits pass an edge within its rounding, or their best hit is as near.
-    possible: Mask,
+    pub possible: Mask,
     /// New [`Line::best`].
     best: V,
     weights: [V; 2],
@@ -63,10 +63,10 @@ impl Met {
         self.hit.any()
     }
 
-    /// Whether it is for [`super::own::pair_doubtful`].
+    /// Lanes that may have hit it and did not: for [`super::own::pair_doubtful`].
     #[inline(always)]
-    pub fn doubt(&self) -> bool {
-        (self.possible & !self.hit).any()
+    pub fn doubt(&self) -> Mask {
+        self.possible & !self.hit
     }
 
     /// A number, as bits of `old` where nothing was hit. Numbers are moved as floats: selection copies bits.

@@ -39,6 +39,13 @@ impl Id {
         Mask::from_bits(below(self.inst, inst) | positions(inst, self.inst) & prim)
     }
 
+    /// Lanes of a group whose best hit is the triangle.
+    #[inline(always)]
+    pub fn is_of<const MANY: bool>(self, groups: &Groups, g: usize) -> Mask {
+        let prim = positions(&groups.of[g].slot, self.prim);
+        Mask::from_bits(if MANY { prim & positions(&groups.inst[g], self.inst) } else { prim })
+    }
+
     /// Names the triangle as what some lanes hit.
     #[inline(always)]
     pub fn name<const MANY: bool>(self, groups: &mut Groups, g: usize, hit: Mask) {

@@ -1,12 +1,13 @@
 //! Set-up triangles against groups and rays.
 
-use super::batch::BATCH;
+use super::batch::{BATCH, Planes};
 use super::bundle::Shared;
 use super::exact::{self, Exact, certain_pair};
-use super::held::{Held, Plane};
+use super::groups::Groups;
+use super::held::{Held, Line, Plane};
 use super::listing::{self, triangles};
 use super::own::{self, Id, may_be_inside, pair_doubtful};
-use super::{GROUPS, Memory, SET, SETS, V};
+use super::{GROUPS, Mask, Memory, SET, SETS, V};
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::Counters;
 
@@ -116,11 +117,12 @@ fn test<
     again.len = 0;
     if listing.by_groups {
         for (g, met) in (0..listing.len()).map(|k| listing.get(k)) {
-            if met & !odd == 0 {
+            let sure = met & !odd;
+            if sure == 0 {
                 continue;
             }
-            let (mut held, mut hits, mut doubts) = (Held::of::<MANY>(groups, g), 0, 0);
-            for i in triangles(met & !odd) {
+            let (mut held, mut hits, mut doubt) = (Held::of::<MANY>(groups, g), 0, Mask::from_bits(0));
+            for i in triangles(sure) {
                 if COUNT {
                     count_pair(held.line.best, counters);
                 }
@@ -128,16 +130,17 @@ fn test<
                 let met = plane.meet::<ANY, BEHIND, END, EARLY>(&held.line);
                 held.take::<ANY, MANY, BEHIND>(&plane, &met, id(i));
                 hits |= u32::from(met.hit()) << i;
-                doubts |= u32::from(met.doubt()) << i;
+                doubt = doubt | met.doubt();
             }
             held.put::<ANY, MANY, BEHIND>(groups, g);
             tested.find(g, hits.count_ones());
-            again.add(g, (doubts | hits & unsteady).into());
+            again.add(g, if doubt.any() { sure } else { hits & unsteady }.into());
         }
     } else {
         for i in triangles(listing.seen() & !odd) {
-            let (plane, id, mut hits, mut doubts) = (Plane::of(planes, i), id(i), 0, 0);
-            for g in listing::groups(listing.groups(i)) {
+            let (plane, id, met) = (Plane::of(planes, i), id(i), listing.groups(i));
+            let (mut hits, mut doubt) = (0, Mask::from_bits(0));
+            for g in listing::groups(met) {
                 if COUNT {
                     count_pair(groups.of[g].inv_lo, counters);
                 }
@@ -146,10 +149,20 @@ fn test<
                 held.take::<ANY, MANY, BEHIND>(&plane, &met, id);
                 held.put::<ANY, MANY, BEHIND>(groups, g);
                 hits |= u64::from(met.hit()) << g;
-                doubts |= u64::from(met.doubt()) << g;
+                doubt = doubt | met.doubt();
             }
             tested.find_all(hits);
-            again.add(i, if unsteady >> i & 1 != 0 { doubts | hits } else { doubts });
+            let unsteady = unsteady >> i & 1 != 0;
+            again.add(
+                i,
+                if doubt.any() {
+                    met
+                } else if unsteady {
+                    hits
+                } else {
+                    0
+                },
+            );
         }
     }
     if odd != 0 {
@@ -166,11 +179,27 @@ fn test<
         for other in listing::groups(doubts) {
             let (g, i) = if listing.by_groups { (of.into(), other) } else { (other, of.into()) };
             let (g, i) = (g & (GROUPS - 1), i & (BATCH - 1));
-            let found = pair_doubtful::<ANY, MANY>(groups, planes, g, i, id(i), END);
-            tested.sets |= u32::from(found) << (g / SET);
+            if unsteady >> i & 1 != 0 || is_doubtful::<ANY, MANY, BEHIND, END, EARLY>(groups, planes, g, i, id(i)) {
+                let found = pair_doubtful::<ANY, MANY>(groups, planes, g, i, id(i), END);
+                tested.sets |= u32::from(found) << (g / SET);
+            }
         }
     }
     tested
+}
+
+/// Whether triangle `i` may change what some ray of group `g` hits once all plain tests are done.
+#[cold]
+#[inline(never)]
+fn is_doubtful<const ANY: bool, const MANY: bool, const BEHIND: bool, const END: bool, const EARLY: bool>(
+    groups: &Groups,
+    planes: &Planes,
+    g: usize,
+    i: usize,
+    id: Id,
+) -> bool {
+    let possible = Plane::of(planes, i).meet::<ANY, BEHIND, END, EARLY>(&Line::of(groups, g)).possible;
+    (possible & !id.is_of::<MANY>(groups, g)).any()
 }
 
 /// Tests the listed pairs as far as the tile's arithmetic is certain, by the common formula from there on.
