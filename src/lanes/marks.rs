@@ -3,12 +3,11 @@
 
 use wide::u64x8;
 
-/// Words that have bit `bit`, as bits.
+/// Words that have some of the set bits of `bits`, as bits.
 #[inline(always)]
-pub fn words_with_bit(words: &[u64; 16], bit: u32) -> u32 {
+pub fn words_with(words: &[u64; 16], bits: u64) -> u32 {
     let [low, high]: [[u64; 8]; 2] = bytemuck::cast(*words);
-    let has =
-        |words: [u64; 8]| !(u64x8::new(words) & u64x8::splat(1 << bit)).simd_eq(u64x8::splat(0)).to_bitmask() & 0xff;
+    let has = |words: [u64; 8]| !(u64x8::new(words) & u64x8::splat(bits)).simd_eq(u64x8::splat(0)).to_bitmask() & 0xff;
     has(low) | has(high) << 8
 }
 
@@ -72,7 +71,7 @@ fn with(words: u64x8, wanted: u32, bit: u32) -> u64x8 {
 fn with_portable(words: u64x8, wanted: u32, bit: u32) -> u64x8 {
     const PLACES: u64x8 = u64x8::new([1, 2, 4, 8, 16, 32, 64, 128]);
     let wanted = (u64x8::splat(wanted.into()) & PLACES).simd_eq(PLACES);
-    words | u64x8::splat(1 << bit) & wanted
+    words | u64x8::splat(bits) & wanted
 }
 
 #[cfg(test)]
@@ -84,7 +83,7 @@ mod tests {
         let words = std::array::from_fn(|i| 1u64 << (4 * i) | 1 << 63);
         for bit in 0..64 {
             let want = if bit == 63 { 0xffff } else { u32::from(bit % 4 == 0) << (bit / 4) };
-            assert_eq!(words_with_bit(&words, bit), want);
+            assert_eq!(words_with(&words, bit), want);
         }
     }
 

@@ -6,9 +6,9 @@
 use super::batch::{BATCH, Planes};
 use super::groups::Groups;
 use super::held::Plane;
-use super::{GROUPS, SET, SETS, V};
+use super::{GROUPS, SET, SETS, V, select};
 use crate::lanes::chosen::lanes_of;
-use crate::lanes::marks::words_with_bit;
+use crate::lanes::marks::words_with;
 use crate::lanes::{LaneMask, Lanes, each};
 
 /// The pairs of a triangle and a group that meet.
@@ -110,33 +110,42 @@ impl Listing {
         groups: &Groups,
         planes: &Planes,
     ) {
-        // Loops: closures over arrays of this length become calls, which cost more than what they do.
-        let (mut wanted, mut any, mut some) = ([0; BATCH], 0, [0; SETS]);
-        for (i, wanted) in wanted.iter_mut().enumerate() {
-            *wanted = if seen >> i & 1 != 0 { met_leaves[i] } else { 0 };
-            any |= *wanted;
-            for (q, some) in some.iter_mut().enumerate().take(N) {
-                *some |= u32::from(*wanted >> (q * SET) & 0xffff != 0) << i;
-            }
+        let Some(wanted) = met_leaves.first_chunk() else { return };
+        // A loop: closures over arrays of this length become calls, which cost more than what they do.
+        let mut any = 0;
+        for (i, groups) in wanted.iter().enumerate() {
+            any |= if seen >> i & 1 != 0 { *groups } else { 0 };
+        }
+        let mut some = [0; SETS];
+        for (q, some) in some.iter_mut().enumerate().take(N) {
+            *some = words_with(wanted, 0xffff << (q * SET)) & seen;
         }
         (self.len, self.pairs) = (0, 0);
         // A group costs with all triangles what a set costs with one; half or twice as much makes no difference.
         self.by_groups = any.count_ones() <= some.iter().map(|some| some.count_ones()).sum::<u32>();
         if self.by_groups {
-            self.group_by_group::<EXACT>(&wanted, any, groups, planes);
+            self.group_by_group::<EXACT>(wanted, (seen, any), groups, planes);
         } else {
             (self.met, self.seen) = ([0; BATCH], 0);
             for (q, some) in some.into_iter().enumerate().take(N) {
-                self.set::<EXACT>(q, &wanted, some, groups, planes);
+                self.set::<EXACT>(q, wanted, some, groups, planes);
             }
         }
     }
 
     /// All triangles against one group after the other.
     #[inline(always)]
-    fn group_by_group<const EXACT: bool>(&mut self, wanted: &[u64; BATCH], any: u64, groups: &Groups, planes: &Planes) {
+    fn group_by_group<const EXACT: bool>(
+        &mut self,
+        wanted: &[u64; BATCH],
+        (seen, any): (u32, u64),
+        groups: &Groups,
+        planes: &Planes,
+    ) {
         let linear = |k: usize| each(|x| V::load(&planes.linear[k][x]));
         let linear = [linear(0), linear(1), linear(2), linear(3)];
+        let zero = V::constant(0.0);
+        let falling = linear.map(|[x, y, _]: [V; 3]| [x.cmp_lt(zero), y.cmp_lt(zero)]);
         let (outside, most) = (V::load(&planes.outside), V::load(&planes.most));
         let (nearest, farthest) = (V::load(&planes.nearest), V::load(&planes.farthest));
         let wild = if EXACT { 0 } else { planes.wild };
@@ -151,14 +160,14 @@ impl Listing {
             let (s0, s1, t0, t1) = (V::splat(low_s[g]), V::splat(high_s[g]), V::splat(low_t[g]), V::splat(high_t[g]));
             let largest = |k: usize| {
                 let [x, y, z]: [V; 3] = linear[k];
-                let along = y.mul_add(t0, z).fast_max(y.mul_add(t1, z));
-                x.mul_add(s0, along).fast_max(x.mul_add(s1, along))
+                let [is_low_s, is_low_t] = falling[k];
+                x.mul_add(select(is_low_s, s0, s1), y.mul_add(select(is_low_t, t0, t1), z))
             };
             let edge = largest(0).fast_min(largest(1)).fast_min(largest(2));
             let inverse = largest(3);
             let inverse = if EXACT { inverse * most } else { nearest.fast_min(farthest.fast_max(inverse)) };
             let met = outside.cmp_le(edge) & V::splat(least[g]).cmp_le(inverse);
-            let met = (met.bits() | wild) & words_with_bit(wanted, g as u32);
+            let met = (met.bits() | wild) & seen & words_with(wanted, 1 << g);
             // Always written, counted where there are any: that is a surprise every time.
             self.triangles[g] = met as u16;
             self.groups[self.len & (GROUPS - 1)] = g as u8;
@@ -245,8 +254,8 @@ mod tests {
             let mut both = |exact: bool| {
                 (by_groups, by_sets) = (Listing::default(), Listing { by_groups: false, ..Listing::default() });
                 match exact {
-                    true => by_groups.group_by_group::<true>(&wanted, any, groups, planes),
-                    false => by_groups.group_by_group::<false>(&wanted, any, groups, planes),
+                    true => by_groups.group_by_group::<true>(&wanted, (0xffff, any), groups, planes),
+                    false => by_groups.group_by_group::<false>(&wanted, (0xffff, any), groups, planes),
                 }
                 for q in 0..SETS {
                     match exact {
