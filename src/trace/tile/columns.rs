@@ -9,7 +9,7 @@ use std::cell::Cell;
 use super::{GROUPS, SET, SETS, V};
 use crate::lanes::words::prefetch;
 use crate::lanes::{Column, Lanes, Lanes3};
-use crate::ray::Rays;
+use crate::ray::{Packet, Rays};
 
 /// Groups between the one that is read (or written) and the one the memory is asked for.
 pub const AHEAD: usize = 8;
@@ -100,8 +100,12 @@ impl<'a> Next<'a> {
     }
 }
 
-/// Asks the memory for what is looked at first: the first groups, and the sample that the first block's frame is made of.
+/// Asks the memory for what is looked at first: the first groups, and the sample that the first block's frame is made of. Not where
+/// the first rays have no segment: so have most that follow them, then, and of such only the ends are read.
 pub fn prefetch_first(rays: &Rays<f32>) {
+    if rays.is_empty() || !Packet::<V>::has_segment(rays, 0) {
+        return;
+    }
     let columns = Columns::of(rays);
     (0..AHEAD).for_each(|g| columns.prefetch(g));
     (0..SET).for_each(|k| columns.prefetch(SETS * k));

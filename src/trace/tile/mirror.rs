@@ -9,11 +9,12 @@
 use glam::{DMat3, DVec3};
 
 use super::bundle::{Bundle, Shared, groups, largest, load3};
+use super::columns::Columns;
 use super::{GROUPS, HALF_ULP, Job, Mask, SET, SETS, V, select};
 use crate::lanes::chosen::merge_lists;
 use crate::lanes::words::{greatest, positions};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each};
-use crate::ray::{HitPacket, Hits, INVALID_ID, Rays};
+use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
 use crate::trace::output::Output;
 use crate::trace::stream;
 
@@ -32,6 +33,10 @@ const MOSTLY: u32 = 12;
 
 /// Points in a row that may turn out to be none before the rest of a block is left to others.
 const FAILURES: u32 = 4;
+
+/// From one group that is tried to the next: all of them, as it has no divisor in common with [`GROUPS`], in an order that jumps
+/// about.
+const JUMP: usize = 21;
 
 /// Groups whose rays a point is made from.
 const SAMPLE: usize = V::N;
@@ -64,8 +69,14 @@ impl<'a> Search<'a> {
         let all = Bundle::unsorted(rays, first, groups::<SETS>(rays, first));
         // One chance less than later: what does not look like a mirror mostly is none.
         let mut search = Self { rays, all, free: [0; GROUPS], tried: 0, failures: 1 };
+        // The groups that are tried if there is no mirror.
+        let columns = Columns::of(rays);
+        (1..FAILURES as usize - 1).for_each(|k| columns.prefetch(first / V::N + k * JUMP % GROUPS));
         loop {
             let g = search.next()?;
+            if !Packet::<V>::has_segment(rays, first + g * V::N) {
+                continue;
+            }
             search.sort(g);
             if search.free[g].count_ones() >= MOSTLY {
                 match search.guess(g) {
@@ -82,8 +93,7 @@ impl<'a> Search<'a> {
     /// The group that is to be tried next.
     fn next(&mut self) -> Option<usize> {
         while self.failures < FAILURES && self.tried < GROUPS {
-            // 21 and 64 have no common divisor: all groups, in an order that jumps about.
-            let g = self.tried * 21 % GROUPS;
+            let g = self.tried * JUMP % GROUPS;
             self.tried += 1;
             if g < self.all.len {
                 return Some(g);
