@@ -71,7 +71,7 @@ fn with(words: u64x8, wanted: u32, bit: u32) -> u64x8 {
 fn with_portable(words: u64x8, wanted: u32, bit: u32) -> u64x8 {
     const PLACES: u64x8 = u64x8::new([1, 2, 4, 8, 16, 32, 64, 128]);
     let wanted = (u64x8::splat(wanted.into()) & PLACES).simd_eq(PLACES);
-    words | u64x8::splat(bits) & wanted
+    words | u64x8::splat(1 << bit) & wanted
 }
 
 #[cfg(test)]
@@ -79,11 +79,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_that_have_a_bit() {
+    fn words_that_have_some_bit() {
         let words = std::array::from_fn(|i| 1u64 << (4 * i) | 1 << 63);
         for bit in 0..64 {
             let want = if bit == 63 { 0xffff } else { u32::from(bit % 4 == 0) << (bit / 4) };
-            assert_eq!(words_with(&words, bit), want);
+            assert_eq!(words_with(&words, 1 << bit), want);
+        }
+        for q in 0..4 {
+            let want = if q == 3 { 0xffff } else { 0xf << (4 * q) };
+            assert_eq!(words_with(&words, 0xffff << (16 * q)), want, "some of the bits of set {q}");
         }
     }
 
