@@ -29,8 +29,6 @@ struct View<'a> {
 
 /// What the leaves of a tree hold.
 trait Leaves<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> {
-    /// Whether leaves that are the only children of a node to visit may be visited in any order.
-    const AT_ONCE: bool;
     /// Asks the memory for what a child refers to: a node of `nodes`, or a leaf.
     fn fetch(&self, nodes: &[Node<f32, WIDTH>], child: Child);
     /// Whether a leaf that `groups` met is dear enough for a test of its box against single rays; `pays`: such tests have paid
@@ -193,8 +191,6 @@ fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
 impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leaves<N, ANY, EXACT, COUNT>
     for Blocks<'_>
 {
-    const AT_ONCE: bool = true;
-
     #[inline(always)]
     fn fetch(&self, nodes: &[Node<f32, WIDTH>], child: Child) {
         prefetch_either(nodes, &self.object.triangles, child.is_leaf(), child.index as usize);
@@ -234,8 +230,6 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
 impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leaves<N, ANY, EXACT, COUNT>
     for Instances<'_>
 {
-    const AT_ONCE: bool = false;
-
     #[inline(always)]
     fn fetch(&self, nodes: &[Node<f32, WIDTH>], child: Child) {
         if !child.is_leaf() {
