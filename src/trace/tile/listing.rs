@@ -110,6 +110,7 @@ impl Listing {
         groups: &Groups,
         planes: &Planes,
     ) {
+        (self.len, self.pairs, self.by_groups) = (0, 0, true);
         let Some(wanted) = met_leaves.first_chunk() else { return };
         // A loop: closures over arrays of this length become calls, which cost more than what they do.
         let mut any = 0;
@@ -120,7 +121,6 @@ impl Listing {
         for (q, some) in some.iter_mut().enumerate().take(N) {
             *some = words_with(wanted, 0xffff << (q * SET)) & seen;
         }
-        (self.len, self.pairs) = (0, 0);
         // A group costs with all triangles what a set costs with one; half or twice as much makes no difference.
         self.by_groups = any.count_ones() <= some.iter().map(|some| some.count_ones()).sum::<u32>();
         if self.by_groups {
@@ -250,25 +250,27 @@ mod tests {
             planes.wild = u32::from(round % 3 == 0) << (round % 16);
             let wanted: [u64; BATCH] = std::array::from_fn(|i| ((next() * 1e6) as i64 as u64) << (4 * i) ^ i as u64);
             let any = wanted.iter().fold(0, |any, wanted| any | wanted);
+            // Those that are not seen are not listed, whatever their leaves met.
+            let seen = if round % 2 == 0 { 0xffff } else { 0x5b6d };
             let (groups, planes) = (&*groups, &*planes);
             let mut both = |exact: bool| {
                 (by_groups, by_sets) = (Listing::default(), Listing { by_groups: false, ..Listing::default() });
                 match exact {
-                    true => by_groups.group_by_group::<true>(&wanted, (0xffff, any), groups, planes),
-                    false => by_groups.group_by_group::<false>(&wanted, (0xffff, any), groups, planes),
+                    true => by_groups.group_by_group::<true>(&wanted, (seen, any), groups, planes),
+                    false => by_groups.group_by_group::<false>(&wanted, (seen, any), groups, planes),
                 }
                 for q in 0..SETS {
                     match exact {
-                        true => by_sets.set::<true>(q, &wanted, 0xffff, groups, planes),
-                        false => by_sets.set::<false>(q, &wanted, 0xffff, groups, planes),
+                        true => by_sets.set::<true>(q, &wanted, seen, groups, planes),
+                        false => by_sets.set::<false>(q, &wanted, seen, groups, planes),
                     }
                 }
                 let pairs = [pairs(&by_groups), pairs(&by_sets)];
                 assert_eq!(pairs[0], pairs[1]);
-                let seen = pairs[0].iter().fold(0, |seen, &(_, i)| seen | 1 << i);
-                assert_eq!(by_sets.seen(), seen);
-                assert!(pairs[0].iter().all(|&(g, i)| wanted[i] >> g & 1 != 0));
-                let wild = if exact { 0 } else { planes.wild };
+                let listed = pairs[0].iter().fold(0, |listed, &(_, i)| listed | 1 << i);
+                assert_eq!(by_sets.seen(), listed);
+                assert!(pairs[0].iter().all(|&(g, i)| wanted[i] >> g & u64::from(seen >> i) & 1 != 0));
+                let wild = if exact { 0 } else { planes.wild & seen };
                 for (i, wanted) in wanted.iter().enumerate().filter(|(i, _)| wild >> i & 1 != 0) {
                     assert!((0..GROUPS).filter(|g| wanted >> g & 1 != 0).all(|g| pairs[0].contains(&(g, i))));
                 }
@@ -276,6 +278,6 @@ mod tests {
             };
             listed += both(false) + both(true);
         }
-        assert!((10_000..200_000).contains(&listed), "{listed}");
+        assert!((5_000..200_000).contains(&listed), "{listed}");
     }
 }
