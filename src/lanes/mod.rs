@@ -18,6 +18,7 @@ mod ftz;
 pub mod functions;
 mod isa;
 pub mod marks;
+pub mod minima;
 mod moved;
 mod pages;
 mod pair;

@@ -152,51 +152,6 @@ fn least_key_portable(keys: &[u16; 8]) -> (u16, usize) {
     (keys[best], best)
 }
 
-/// Lane `i` of the result is the least value of row `i`. No NaNs.
-#[inline(always)]
-pub fn row_minima(rows: &[f32x16; 16]) -> f32x16 {
-    #[cfg(target_feature = "avx512f")]
-    {
-        avx512::row_minima(rows)
-    }
-    #[cfg(not(target_feature = "avx512f"))]
-    row_minima_portable(rows)
-}
-
-/// The same of rows that lie apart. One by one: a loop over them would copy them into memory first.
-#[inline(always)]
-pub fn row_minima_of(row: impl Fn(usize) -> f32x16) -> f32x16 {
-    row_minima(&[
-        row(0),
-        row(1),
-        row(2),
-        row(3),
-        row(4),
-        row(5),
-        row(6),
-        row(7),
-        row(8),
-        row(9),
-        row(10),
-        row(11),
-        row(12),
-        row(13),
-        row(14),
-        row(15),
-    ])
-}
-
-#[cfg(any(test, not(target_feature = "avx512f")))]
-fn row_minima_portable(rows: &[f32x16; 16]) -> f32x16 {
-    f32x16::new(std::array::from_fn(|i| {
-        let mut half = rows[i].to_array();
-        for step in [8, 4, 2, 1] {
-            (0..step).for_each(|k| half[k] = if half[k] < half[k + step] { half[k] } else { half[k + step] });
-        }
-        half[0]
-    }))
-}
-
 /// Writes the positions of the set bits of a 16-bit mask, counted from `base` on, to the front of `list`, ascending; what
 /// follows them is unspecified. Returns how many there are. `base` is at most 240.
 #[inline(always)]
@@ -250,43 +205,6 @@ fn transpose_bits_portable<const K: usize>(planes: [u32; K]) -> [u8; 16] {
     std::array::from_fn(|i| planes.iter().enumerate().fold(0, |all, (k, plane)| all | ((plane >> i & 1) << k) as u8))
 }
 
-/// A 16x16 tree of shuffles: 45 instructions instead of 16 reductions.
-#[cfg(target_feature = "avx512f")]
-mod avx512 {
-    use std::arch::x86_64::{_mm512_loadu_ps, _mm512_min_ps, _mm512_shuffle_f32x4, _mm512_shuffle_ps};
-    use std::arch::x86_64::{_mm512_storeu_ps, _mm512_unpackhi_ps, _mm512_unpacklo_ps};
-    use wide::f32x16;
-
-    #[inline(always)]
-    pub fn row_minima(rows: &[f32x16; 16]) -> f32x16 {
-        let mut minima = [0.0; 16];
-        // SAFETY: compiled only where the whole build has AVX-512F. Every load reads the 64 bytes of one row, which
-        // is a vector of 16 floats; the store fills the 64 bytes of `minima`.
-        unsafe {
-            let row = |i: usize| _mm512_loadu_ps((&raw const rows[i]).cast::<f32>());
-            // Quarters of two rows folded into one register: 0 and 1 from the first, 2 and 3 from the second.
-            let fold = |i: usize| {
-                let (a, b) = (row(i), row(i + 8));
-                _mm512_min_ps(_mm512_shuffle_f32x4::<0x44>(a, b), _mm512_shuffle_f32x4::<0xee>(a, b))
-            };
-            // One quarter each of rows i, i + 8, i + 4, i + 12.
-            let quarters = |i: usize| {
-                let (a, b) = (fold(i), fold(i + 4));
-                _mm512_min_ps(_mm512_shuffle_f32x4::<0x88>(a, b), _mm512_shuffle_f32x4::<0xdd>(a, b))
-            };
-            let pairs = |i: usize| {
-                let (a, b) = (quarters(i), quarters(i + 1));
-                _mm512_min_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b))
-            };
-            let (a, b) = (pairs(0), pairs(2));
-            let all = _mm512_min_ps(_mm512_shuffle_ps::<0x44>(a, b), _mm512_shuffle_ps::<0xee>(a, b));
-            // Rows 0..4, 8..12, 4..8, 12..16 to their places.
-            _mm512_storeu_ps(minima.as_mut_ptr(), _mm512_shuffle_f32x4::<0xd8>(all, all));
-        }
-        f32x16::new(minima)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -309,25 +227,6 @@ mod tests {
             rest[want.1] = u16::MAX;
             assert_eq!((least_key(&keys), least_key_portable(&keys)), (want, want));
             assert_eq!(without_key(&keys, want.1), rest);
-        }
-    }
-
-    #[test]
-    fn row_minima_are_those_of_each_row() {
-        let mut next = numbers();
-        for _ in 0..200 {
-            let rows: [[f32; 16]; 16] = std::array::from_fn(|_| {
-                std::array::from_fn(|_| match next() % 8 {
-                    0 => f32::INFINITY,
-                    1 => f32::NEG_INFINITY,
-                    _ => next() as i32 as f32 * 1e-3,
-                })
-            });
-            let vectors = rows.map(f32x16::new);
-            let want = rows.map(|row| row.into_iter().fold(f32::INFINITY, f32::min).to_bits());
-            assert_eq!(row_minima(&vectors).to_array().map(f32::to_bits), want);
-            assert_eq!(vectors.map(least).map(f32::to_bits), want);
-            assert_eq!(row_minima_portable(&vectors).to_array().map(f32::to_bits), want);
         }
     }
 

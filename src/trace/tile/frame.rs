@@ -72,16 +72,16 @@ impl Frame {
         let single = groups.is_power_of_two().then(|| groups.trailing_zeros() as usize);
         let mut used = 0;
         for i in 0..SET {
-            let (g, lane) = match single {
-                Some(g) => (g, i),
-                None => {
-                    // Of the `N` groups here the first that is of the tile.
-                    let here = groups >> (N * i) & ((1 << N) - 1);
-                    let g = N * i + if here == 0 { 0 } else { here.trailing_zeros() as usize };
-                    (g, (bundle.live(rays, g).trailing_zeros() as usize).min(V::N - 1))
-                }
+            // Of the `N` groups here the first that is of the tile.
+            let here = groups >> (N * i) & ((1 << N) - 1);
+            let g = match single {
+                Some(g) => g,
+                None if here != 0 => N * i + here.trailing_zeros() as usize,
+                None => continue,
             };
-            if groups >> g & 1 == 0 || bundle.live(rays, g) >> lane & 1 == 0 {
+            let live = bundle.live(rays, g);
+            let lane = if single.is_some() { i } else { live.trailing_zeros() as usize & (V::N - 1) };
+            if live >> lane & 1 == 0 {
                 continue;
             }
             used |= 1 << i;

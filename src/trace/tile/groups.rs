@@ -4,9 +4,11 @@ use super::bundle::{Bundle, Shared, Source};
 use super::columns::{AHEAD, Columns};
 use super::frame::Frame;
 use super::lines::Lines;
+use super::listing;
 use super::presumed::Look;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
-use crate::lanes::words::{greatest, least, row_minima, row_minima_of};
+use crate::lanes::minima::{quarter_minima, quarters, row_minima_of};
+use crate::lanes::words::{greatest, least};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::math::Aabb;
 use crate::scene::world::World;
@@ -31,7 +33,8 @@ pub struct Group {
     pub t: V,
     /// The best hit (or the end of the segment) is surely not farther than this. Own answers: it is there.
     pub inv_lo: V,
-    /// The best hit is surely not nearer than this. Own answers: no hit may be nearer than this, the segment's start.
+    /// The best hit is surely not nearer than this. Own answers: no hit may be nearer than this, the segment's start; only kept
+    /// where some segment [`Groups::ends_early`].
     pub inv_hi: V,
     /// Triangle of the best hit, as [`super::batch::Batch::id`] has it, or [`NO_SLOT`].
     pub slot: [u32; 16],
@@ -79,6 +82,9 @@ pub struct Groups {
     pub ends_early: bool,
     /// The common point is behind where segments start.
     pub is_behind: bool,
+    /// While a set's rays are loaded: s, t, -s, -t of each group, a quarter of a vector each ([`quarters`]). Greatest values as
+    /// least negatives: one kind of shuffle tree does both.
+    ends: [V; SET],
     /// How far behind, by group and in the rays' parameter. Apart from [`Group`], as other tiles do not need it.
     behind: [V; GROUPS],
     /// Own answers: which part of the way from that point to the best hit is ahead of the start.
@@ -91,13 +97,15 @@ pub struct Groups {
     pub rect: [[[V; SETS]; 2]; 2],
     /// The same as fractions of the tile's rectangle.
     pub part: [[[V; SETS]; 2]; 2],
-    /// Per group: least [`Groups::inv_lo`].
+    /// Rays with a common end: factor of [`Group::inv_lo`] that makes it sure. Else 1, and it is sure by itself.
+    pub reach: f32,
+    /// Per group: least [`Group::inv_lo`], sure.
     pub least: [V; SETS],
     /// Per group: farthest depth that is still of interest; minus infinity for none.
     pub far: [V; SETS],
     /// Farthest of all groups.
     pub farthest: f32,
-    /// Least [`Groups::inv_lo`] of all: a triangle that is farther everywhere is of no interest.
+    /// Least [`Groups::least`] of all: a triangle that is farther everywhere is of no interest.
     pub nearest: f32,
     /// Rectangle of the whole tile: `[axis][least, greatest]`.
     pub bounds: [[f32; 2]; 2],
@@ -121,12 +129,14 @@ impl Default for Groups {
             endless: false,
             ends_early: false,
             is_behind: false,
+            ends: [V::splat(0.0); SET],
             behind: [V::splat(0.0); GROUPS],
             ahead: [V::splat(0.0); GROUPS],
             front: 0.0,
             loose: 0.0,
             rect: [[zero; 2]; 2],
             part: [[zero; 2]; 2],
+            reach: 1.0,
             least: zero,
             far: zero,
             farthest: 0.0,
@@ -159,7 +169,7 @@ impl Groups {
         }
         let most = V::splat(f32::INFINITY);
         let (mut near, mut reach, mut front) = (most, V::splat(0.0), most);
-        self.endless = true;
+        let (mut whole, mut live) = (0, 0);
         let mut look = Look::default();
         let columns = match bundle.source {
             Source::Batch(rays) => Some(Columns::of(rays)),
@@ -167,9 +177,6 @@ impl Groups {
         };
         let from = bundle.first / V::N;
         for q in 0..N {
-            let mut lows = [[most; SET]; 2];
-            // Greatest values as least negatives: one kind of shuffle tree does both.
-            let mut highs = [[most; SET]; 2];
             for i in 0..SET {
                 let g = q * SET + i;
                 self.of[g].slot = [NO_SLOT; 16];
@@ -187,13 +194,14 @@ impl Groups {
                 }
                 if tame == 0 {
                     (self.of[g].inv_lo, self.of[g].inv_hi) = (most, most);
+                    self.ends[i] = most;
+                    whole |= 1 << g;
                     continue;
                 }
                 let lines = match &segments {
                     Some(segments) => Lines::of(&self.frame, bundle, segments, tame),
                     None => Lines::of_pencil(&self.frame, bundle, g),
                 };
-                self.endless &= lines.whole;
                 if tame & !lines.fit != 0 {
                     return false;
                 }
@@ -202,12 +210,14 @@ impl Groups {
                 if bundle.shared != Shared::Start {
                     self.of[g].start = map3(lines.start, |x| x * V::splat(self.frame.scale));
                 }
-                lows[0][i] = select(lanes, lines.s, most);
-                lows[1][i] = select(lanes, lines.t, most);
-                highs[0][i] = select(lanes, -lines.s, most);
-                highs[1][i] = select(lanes, -lines.t, most);
-                if !lines.whole {
+                let ends = [lines.s, lines.t, -lines.s, -lines.t];
+                self.ends[i] = quarters(ends.map(|end| select(lanes, end, most)));
+                self.of[g].inv_lo = select(lanes, bounded(lines.far), most);
+                live |= 1 << g;
+                whole |= u64::from(lines.whole) << g;
+                if EXACT || !lines.whole {
                     near = select(lanes, lines.near, most).fast_min(near);
+                    self.of[g].inv_hi = select(lanes, if EXACT { lines.far } else { lines.near }, most);
                 }
                 if ANY {
                     reach = select(lanes, lines.reach, reach).fast_max(reach);
@@ -216,12 +226,16 @@ impl Groups {
                     self.behind[g] = lines.behind;
                     front = select(lanes, lines.behind / lines.slowness, front).fast_min(front);
                 }
-                self.of[g].inv_lo = select(lanes, bounded(lines.far), most);
-                self.of[g].inv_hi = select(lanes, if EXACT { lines.far } else { lines.near }, most);
             }
-            for axis in 0..2 {
-                self.rect[axis][0][q] = row_minima(&lows[axis]);
-                self.rect[axis][1][q] = -row_minima(&highs[axis]);
+            let [low_s, low_t, high_s, high_t] = quarter_minima(&self.ends);
+            self.rect[0][0][q] = low_s;
+            self.rect[0][1][q] = -high_s;
+            self.rect[1][0][q] = low_t;
+            self.rect[1][1][q] = -high_t;
+            let [whole, live] = [whole, live].map(|groups: u64| (groups >> (q * SET)) as u32 & 0xffff);
+            match !EXACT && bundle.shared == Shared::Start && whole == 0xffff {
+                true => self.least[q] = select(Mask::from_bits(live), V::constant(0.0), most),
+                false => self.look_far(q),
             }
         }
         if ANY && bundle.presumed && !bundle.confirm(&look) {
@@ -247,7 +261,11 @@ impl Groups {
                 }
             }
         }
+        self.endless = whole == u64::MAX >> (GROUPS - N * SET);
         self.ends_early = least(near) < f32::INFINITY;
+        if self.ends_early && !EXACT {
+            listing::groups(whole).for_each(|g| self.of[g].inv_hi = most);
+        }
         self.slack = (bundle.slack + 8.0 * HALF_ULP * greatest(reach)) * self.frame.scale;
         self.is_behind = bundle.shared == Shared::Behind;
         (self.front, self.loose) = (0.0, 32.0 * HALF_ULP * (1.0 + self.wide));
@@ -259,21 +277,29 @@ impl Groups {
             }
             self.front = front * (1.0 - self.loose);
         }
+        self.reach = 1.0;
         if EXACT || bundle.shared != Shared::Start {
-            self.loosen::<N>(near);
+            self.loosen::<N, ANY, EXACT>(near);
         }
-        self.refresh::<N>(u32::MAX);
+        self.settle::<N>(u32::MAX);
         true
     }
 
     /// The ends of the segments, moved apart by what rounding may have done to them.
     #[inline(always)]
-    fn loosen<const N: usize>(&mut self, near: V) {
+    fn loosen<const N: usize, const ANY: bool, const EXACT: bool>(&mut self, near: V) {
         let loose = self.loose;
-        for g in 0..N * SET {
-            self.of[g].inv_lo *= V::splat(1.0 - loose);
-            self.of[g].inv_hi *= V::splat(1.0 + loose);
+        let (less, more) = (V::splat(1.0 - loose), V::splat(1.0 + loose));
+        if ANY && !EXACT {
+            // How far a segment goes is told by its start: only whether a box is within reach is left to its depth.
+            self.reach = 1.0 - loose;
+        } else {
+            self.of[..N * SET].iter_mut().for_each(|group| group.inv_lo *= less);
         }
+        if EXACT || self.ends_early {
+            self.of[..N * SET].iter_mut().for_each(|group| group.inv_hi *= more);
+        }
+        self.least.iter_mut().for_each(|least| *least *= less);
         self.cap = least(near) * (1.0 - loose);
     }
 
@@ -326,8 +352,24 @@ impl Groups {
     #[inline(always)]
     pub fn refresh<const N: usize>(&mut self, sets: u32) {
         for q in (0..N).filter(|q| N == 1 || sets >> q & 1 != 0) {
-            let Some(of) = self.of[q * SET..].first_chunk::<SET>() else { continue };
+            self.look_far(q);
+            self.least[q] *= V::splat(self.reach);
+        }
+        self.settle::<N>(sets);
+    }
+
+    /// How far the groups of a set look, by the ends of their rays' segments or what these found.
+    #[inline(always)]
+    fn look_far(&mut self, q: usize) {
+        if let Some(of) = self.of[q * SET..].first_chunk::<SET>() {
             self.least[q] = row_minima_of(|i| of[i].inv_lo);
+        }
+    }
+
+    /// The same, where the least reciprocals are known.
+    #[inline(always)]
+    fn settle<const N: usize>(&mut self, sets: u32) {
+        for q in (0..N).filter(|q| N == 1 || sets >> q & 1 != 0) {
             let waiting = self.least[q].cmp_lt(V::splat(f32::INFINITY));
             // A little farther than the reciprocal, whatever its rounding.
             let far = V::splat(1.0 + 4.0 * HALF_ULP) / self.least[q];

@@ -81,7 +81,10 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
 ) -> bool {
     let (plane, line) = (Plane::of(planes, i), Line::of(groups, g));
     let (inverse, best, edges) = (plane.depth(&line), line.best, plane.edges(&line));
-    let mut maybe = edges.possible & inverse.cmp_le(groups.of[g].inv_hi);
+    let mut maybe = edges.possible;
+    if groups.ends_early {
+        maybe = maybe & inverse.cmp_le(groups.of[g].inv_hi);
+    }
     if ANY && to_end {
         maybe = maybe & V::constant(0.0).cmp_le(plane.behind(&line)) & best.cmp_lt(V::splat(f32::INFINITY));
     } else {

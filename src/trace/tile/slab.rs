@@ -107,6 +107,7 @@ impl Slabs {
         let lo = each(|a| V::splat(bounds.lo[a] - space.apex[a] - space.margin));
         let hi = each(|a| V::splat(bounds.hi[a] - space.apex[a] + space.margin));
         let more = V::splat(1.0 + 16.0 * HALF_ULP);
+        let reach = V::splat((1.0 + 16.0 * HALF_ULP) / groups.reach);
         let (mut met, mut rest) = (0, wanted);
         while rest != 0 {
             let g = rest.trailing_zeros() as usize & (GROUPS - 1);
@@ -117,7 +118,7 @@ impl Slabs {
             });
             let near = x.0.fast_max(y.0).fast_max(z.0.fast_max(V::splat(0.0)));
             let far = x.1.fast_min(y.1).fast_min(z.1) * more;
-            let hit = near.cmp_le(far) & (near * groups.of[g].inv_lo).cmp_le(more);
+            let hit = near.cmp_le(far) & (near * groups.of[g].inv_lo).cmp_le(reach);
             met |= u64::from(hit.any()) << g;
         }
         let (tested, culled) = (wanted.count_ones() as i32, (wanted & !met).count_ones() as i32);
