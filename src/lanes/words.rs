@@ -60,6 +60,8 @@ pub fn prefetch_either<A, B>(first: &[A], second: &[B], from_second: bool, i: us
         let element = list.wrapping_add(i.min(len) * size);
         let lines = const { if size_of::<A>() > size_of::<B>() { size_of::<A>() } else { size_of::<B>() } };
         for line in (0..lines).step_by(64) {
+            // What the shorter of the two lacks is its first line once more: nothing else is driven out of the cache for it.
+            let line = if line < size { line } else { 0 };
             // SAFETY: a prefetch reads nothing the program can see and does not fault, whatever the address.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(element.wrapping_add(line)) };
         }

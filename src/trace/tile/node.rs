@@ -157,7 +157,8 @@ impl Planes {
         let (mz, rz) = (middle(self.depth), radius(self.depth_size, self.depth_margin));
         // Left of the tile's left edge or right of its right edge, all of the box.
         let least = left_low.fast_min(below_low).fast_min(right_high.fast_min(above_high));
-        let outside = least.cmp_lt(zero) | (mz + rz).cmp_lt(splat(self.front));
+        let near = mz - rz;
+        let outside = least.cmp_lt(zero) | (mz + rz).cmp_lt(splat(self.front)) | splat(tile.farthest).cmp_lt(near);
         let met = !outside.bits() & ((1u32 << node.used.min(WIDTH as u32)) - 1);
         if met == 0 {
             return 0;
@@ -169,13 +170,12 @@ impl Planes {
             low.store(&mut sides.low[family]);
             (high - low).store(&mut sides.step[family]);
         }
-        let near = mz - rz;
         near.store(&mut level.near);
         let (mut rest, mut kept) = (met, 0);
         while rest != 0 {
             let child = slot(rest.trailing_zeros());
             rest &= rest - 1;
-            let some = groups & sides.groups_at::<N>(child, tile) & level.within_reach::<N>(child, tile);
+            let some = groups & sides.groups_at::<N>(child, tile);
             level.met[child] = some;
             kept |= u32::from(some != 0) << child;
         }
