@@ -49,11 +49,13 @@ impl Frame {
                 return Some(Self { apex, axes: map3(axes, |axis| axis.map(|x| x as f32 * scale)), scale, extent });
             }
         };
-        let (sum, across) = Self::mean_direction::<N>(bundle, rays, groups);
+        let [sum, across, along] = Self::mean_direction::<N>(bundle, rays, groups);
         let a = normalised(sum)?;
         let flat = |r: [f64; 3]| sub(r, a.map(|x| x * dot(r, a)));
+        let (across, along) = (flat(across), flat(along));
+        let long = if dot(across, across) < dot(along, along) { along } else { across };
         // One direction, or directions on a line through the apex: any perpendicular axis does.
-        let u = normalised(flat(across)).or_else(|| {
+        let u = normalised(long).or_else(|| {
             let other = if a[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
             normalised(flat(other))
         })?;
@@ -62,11 +64,11 @@ impl Frame {
         Some(Self { apex, axes, scale, extent })
     }
 
-    /// Sum of unit directions of a sample of the rays, and the same with the left half of the picture negative.
+    /// Sum of unit directions of a sample of the rays, and the same with the left half of the picture negative, and the upper half.
     /// The order of rays in a block (Morton) says what is left; where it is another order, nothing but the fit of
     /// the rectangles gets worse.
     #[inline(always)]
-    fn mean_direction<const N: usize>(bundle: &Bundle, rays: &Rays<f32>, groups: u64) -> ([f64; 3], [f64; 3]) {
+    fn mean_direction<const N: usize>(bundle: &Bundle, rays: &Rays<f32>, groups: u64) -> [[f64; 3]; 3] {
         let mut sample: Lanes3<[f32; SET]> = Default::default();
         // One group alone is sampled whole, else one of `N` groups by its first lane.
         let single = groups.is_power_of_two().then(|| groups.trailing_zeros() as usize);
@@ -98,12 +100,13 @@ impl Frame {
         let quarter = groups & (groups - 1) != 0 && (0..4).any(|q| groups & !(0xf << (4 * q)) == 0);
         let bit = if quarter { 1 } else { 4 };
         let unit = map3(sample, |x| select(used, x * scale, V::constant(0.0)).to_array());
-        let mut sums = ([0.0f64; 3], [0.0f64; 3]);
+        let mut sums = [[0.0f64; 3]; 3];
         for axis in 0..3 {
             for i in 0..SET {
                 let x = f64::from(unit[axis][i]);
-                sums.0[axis] += x;
-                sums.1[axis] += if i & bit == 0 { -x } else { x };
+                sums[0][axis] += x;
+                sums[1][axis] += if i & bit == 0 { -x } else { x };
+                sums[2][axis] += if i & (2 * bit) == 0 { -x } else { x };
             }
         }
         sums
