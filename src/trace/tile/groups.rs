@@ -109,6 +109,8 @@ pub struct Groups {
     pub nearest: f32,
     /// Rectangle of the whole tile: `[axis][least, greatest]`.
     pub bounds: [[f32; 2]; 2],
+    /// The same of each set, four times over: lane 4 * i + set.
+    pub of_sets: [[V; 2]; 2],
     /// Largest |s|, |t| of the tile.
     pub wide: f32,
     /// Surely no hit is nearer than 1 / this (start of the segments).
@@ -142,6 +144,7 @@ impl Default for Groups {
             farthest: 0.0,
             nearest: 0.0,
             bounds: [[0.0; 2]; 2],
+            of_sets: [[V::splat(0.0); 2]; 2],
             wide: 0.0,
             cap: 0.0,
             slack: 0.0,
@@ -241,13 +244,15 @@ impl Groups {
         if ANY && bundle.presumed && !bundle.confirm(&look) {
             return false;
         }
-        self.bounds = [0, 1].map(|axis| {
+        let of_sets = [0, 1].map(|axis| {
             let [lo, hi] = &self.rect[axis];
-            [
-                (0..N).fold(f32::INFINITY, |m, q| m.min(least(lo[q]))),
-                (0..N).fold(f32::NEG_INFINITY, |m, q| m.max(greatest(hi[q]))),
-            ]
+            let side = |end: &dyn Fn(usize) -> f32| std::array::from_fn::<f32, SETS, _>(|q| end(q.min(N - 1)));
+            [side(&|q| least(lo[q])), side(&|q| greatest(hi[q]))]
         });
+        self.bounds = of_sets.map(|[lo, hi]| {
+            [lo.into_iter().fold(f32::INFINITY, f32::min), hi.into_iter().fold(f32::NEG_INFINITY, f32::max)]
+        });
+        self.of_sets = of_sets.map(|sides| sides.map(|side| V::new(std::array::from_fn(|i| side[i % SETS]))));
         self.wide = self.bounds.iter().flatten().fold(0.0, |w, x| x.abs().max(w));
         if self.wide >= WIDEST {
             return false;

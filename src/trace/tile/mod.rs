@@ -37,6 +37,7 @@ mod place;
 mod presumed;
 mod shapes;
 mod slab;
+mod spans;
 mod walk;
 
 use super::output::Output;

@@ -9,6 +9,7 @@
 
 use super::frame::Frame;
 use super::groups::Groups;
+use super::spans::{Spans, groups_of};
 use super::{SET, V};
 use crate::bvh::{Node, Nodes, Tree};
 use crate::lanes::words::{signs, upper_halves, without_key};
@@ -51,6 +52,7 @@ pub struct Planes {
     /// Boxes that end before this depth are not met.
     front: f32,
     apex: [f32; 3],
+    spans: Spans,
 }
 
 /// An opened node: children that are left to visit.
@@ -92,7 +94,7 @@ impl Planes {
     /// The planes of a loaded tile whose frame is `frame` in the space of the boxes. `margin`: how far outside of a box
     /// its contents may be met, in that space.
     #[inline(always)]
-    pub fn of(groups: &Groups, frame: &Frame, margin: f32) -> Self {
+    pub fn of<const N: usize>(groups: &Groups, frame: &Frame, margin: f32) -> Self {
         let [u, v, a] = frame.axes;
         let mut planes = Self {
             normal: [[[0.0; 3]; 2]; 2],
@@ -103,6 +105,7 @@ impl Planes {
             depth_margin: 0.0,
             front: groups.front,
             apex: frame.apex,
+            spans: Spans::of::<N>(groups, frame, margin),
         };
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
         for (axis, across) in [u, v].into_iter().enumerate() {
@@ -131,13 +134,9 @@ impl Planes {
     ) -> u32 {
         let splat = <Children as Lanes>::splat;
         let zero = splat(0.0);
-        let (mut sum, mut size) = ([zero; 3], [zero; 3]);
-        for a in 0..3 {
-            let origin = splat(self.apex[a]);
-            let [lo, hi] = &node.bounds[a];
-            let (lo, hi) = (Children::load(lo) - origin, Children::load(hi) - origin);
-            (sum[a], size[a]) = (hi + lo, hi - lo);
-        }
+        let side = |side: usize| each(|a| Children::load(&node.bounds[a][side]) - splat(self.apex[a]));
+        let (lo, hi): ([Children; 3], [Children; 3]) = (side(0), side(1));
+        let (sum, size): ([Children; 3], [Children; 3]) = (each(|a| hi[a] + lo[a]), each(|a| hi[a] - lo[a]));
         let middle = |n: [f32; 3]| {
             let n = map3(n, splat);
             n[0].mul_add(sum[0], n[1].mul_add(sum[1], n[2] * sum[2]))
@@ -171,11 +170,12 @@ impl Planes {
             (high - low).store(&mut sides.step[family]);
         }
         near.store(&mut level.near);
+        let of_sets = self.spans.met::<N>(&lo, &hi);
         let (mut rest, mut kept) = (met, 0);
         while rest != 0 {
             let child = slot(rest.trailing_zeros());
             rest &= rest - 1;
-            let some = groups & sides.groups_at::<N>(child, tile);
+            let some = groups & groups_of(of_sets, child) & sides.groups_at::<N>(child, tile);
             level.met[child] = some;
             kept |= u32::from(some != 0) << child;
         }
