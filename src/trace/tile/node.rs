@@ -52,7 +52,8 @@ pub struct Planes {
     /// Boxes that end before this depth are not met.
     front: f32,
     apex: [f32; 3],
-    spans: Spans,
+    /// See [`Spans`].
+    pub spans: Spans,
 }
 
 /// An opened node: children that are left to visit.

@@ -7,6 +7,7 @@
 
 use super::bundle::Bundle;
 use super::groups::Groups;
+use super::spans::Spans;
 use super::{GROUPS, HALF_ULP, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, each, map3};
 use crate::math::{Aabb, Affine};
@@ -99,28 +100,27 @@ impl Slabs {
         self.score = (self.score + evidence).clamp(SCORES.0, SCORES.1);
     }
 
-    /// Of `groups`, those with a ray that meets the box.
+    /// Of `groups`, those with a ray that meets the box. `spans`: the tile's directions in its space.
     #[inline(never)]
-    pub fn test(&mut self, groups: &Groups, bundle: &Bundle, space: &Space, bounds: &Aabb<f32>, wanted: u64) -> u64 {
+    pub fn test(
+        &mut self,
+        groups: &Groups,
+        (bundle, space, spans): (&Bundle, &Space, &Spans),
+        bounds: &Aabb<f32>,
+        wanted: u64,
+    ) -> u64 {
         let slopes = &mut self.slopes[usize::from(space.to_local.is_some())];
         slopes.prepare(groups, bundle, space, wanted & !slopes.ready);
-        let lo = each(|a| V::splat(bounds.lo[a] - space.apex[a] - space.margin));
-        let hi = each(|a| V::splat(bounds.hi[a] - space.apex[a] + space.margin));
-        let more = V::splat(1.0 + 16.0 * HALF_ULP);
-        let reach = V::splat((1.0 + 16.0 * HALF_ULP) / groups.reach);
-        let (mut met, mut rest) = (0, wanted);
-        while rest != 0 {
-            let g = rest.trailing_zeros() as usize & (GROUPS - 1);
-            rest &= rest - 1;
-            let [x, y, z] = each(|a| {
-                let (one, other) = (lo[a] * slopes.per_axis[g][a], hi[a] * slopes.per_axis[g][a]);
-                (one.fast_min(other), one.fast_max(other))
-            });
-            let near = x.0.fast_max(y.0).fast_max(z.0.fast_max(V::splat(0.0)));
-            let far = x.1.fast_min(y.1).fast_min(z.1) * more;
-            let hit = near.cmp_le(far) & (near * groups.of[g].inv_lo).cmp_le(reach);
-            met |= u64::from(hit.any()) << g;
-        }
+        let lo = each(|a| bounds.lo[a] - space.apex[a] - space.margin);
+        let hi = each(|a| bounds.hi[a] - space.apex[a] + space.margin);
+        let met = match spans.backwards() {
+            Some(backwards) => {
+                let near = each(|a| if backwards[a] { hi[a] } else { lo[a] });
+                let far = each(|a| if backwards[a] { lo[a] } else { hi[a] });
+                slopes.met::<true>(groups, near, far, wanted)
+            }
+            None => slopes.met::<false>(groups, lo, hi, wanted),
+        };
         let (tested, culled) = (wanted.count_ones() as i32, (wanted & !met).count_ones() as i32);
         self.add(SAVED * culled - COST * (tested + 1));
         met
@@ -128,6 +128,29 @@ impl Slabs {
 }
 
 impl Slopes {
+    /// Of the `wanted` groups those with a ray that meets the box between some planes. `ORDERED`: `one` are those that all rays meet
+    /// first, `other` last; else either may be.
+    #[inline(always)]
+    fn met<const ORDERED: bool>(&self, groups: &Groups, one: [f32; 3], other: [f32; 3], wanted: u64) -> u64 {
+        let (one, other) = (one.map(V::splat), other.map(V::splat));
+        let more = V::splat(1.0 + 16.0 * HALF_ULP);
+        let reach = V::splat((1.0 + 16.0 * HALF_ULP) / groups.reach);
+        let (mut met, mut rest) = (0, wanted);
+        while rest != 0 {
+            let g = rest.trailing_zeros() as usize & (GROUPS - 1);
+            rest &= rest - 1;
+            let [x, y, z] = each(|a| {
+                let (one, other) = (one[a] * self.per_axis[g][a], other[a] * self.per_axis[g][a]);
+                if ORDERED { (one, other) } else { (one.fast_min(other), one.fast_max(other)) }
+            });
+            let near = x.0.fast_max(y.0).fast_max(z.0.fast_max(V::constant(0.0)));
+            let far = x.1.fast_min(y.1).fast_min(z.1) * more;
+            let hit = near.cmp_le(far) & (near * groups.of[g].inv_lo).cmp_le(reach);
+            met |= u64::from(hit.any()) << g;
+        }
+        met
+    }
+
     /// Reciprocals of the directions, scaled so that the parameter is the depth.
     #[inline(always)]
     fn prepare(&mut self, groups: &Groups, bundle: &Bundle, space: &Space, mut missing: u64) {

@@ -36,51 +36,69 @@ pub struct Spans {
     beyond: [f32; 3],
 }
 
+/// Depth per unit of the near plane's distance and the far plane's, for components of directions over some rectangles; and which of
+/// them are all positive, or all negative, as bits.
+#[derive(Clone, Copy, Debug)]
+struct Ends {
+    near: V,
+    far: V,
+    forwards: u32,
+    backwards: u32,
+}
+
+impl Ends {
+    /// Of components `u * s + v * t + a`.
+    #[inline(always)]
+    fn of([u, v, a]: [V; 3], [[s0, s1], [t0, t1]]: [[V; 2]; 2], wide: f32) -> Self {
+        let (zero, one) = (V::constant(0.0), V::constant(1.0));
+        let (left, below) = (u.cmp_lt(zero), v.cmp_lt(zero));
+        let least = u.mul_add(select(left, s1, s0), v.mul_add(select(below, t1, t0), a));
+        let most = u.mul_add(select(left, s0, s1), v.mul_add(select(below, t0, t1), a));
+        let size = V::splat(ROUNDING) * V::splat(wide).mul_add(u.abs() + v.abs(), a.abs());
+        let (least, most) = (least - size, most + size);
+        let (forwards, is_back) = (zero.cmp_lt(least).bits(), most.cmp_lt(zero));
+        let (by_least, by_most) = (one / least, one / most);
+        Self {
+            near: select(is_back, by_least, by_most) * V::splat(1.0 - ROUNDING),
+            far: select(is_back, by_most, by_least) * V::splat(1.0 + ROUNDING),
+            forwards,
+            backwards: is_back.bits(),
+        }
+    }
+}
+
 impl Spans {
     /// Those of the first `N` sets of a loaded tile. `frame` and `margin`: see [`super::node::Planes::of`].
     #[inline(always)]
     pub fn of<const N: usize>(groups: &Groups, frame: &Frame, margin: f32) -> Self {
         let axes = frame.axes.map(|axis| DVec3::from(axis.map(f64::from)));
-        // Columns: where s, t and depth grow by one each, and the others stay.
         let to_space = DMat3::from_cols(axes[0], axes[1], axes[2]).transpose().inverse();
         let columns = [to_space.x_axis, to_space.y_axis, to_space.z_axis].map(|c| c.to_array().map(|x| x as f32));
-        let [u, v, a] = columns;
         // Lane 4 * axis + set.
         let lanes = |x: [f32; 3]| V::new(std::array::from_fn(|i| if i / SETS < 3 { x[i / SETS] } else { 0.0 }));
-        let [u_lanes, v_lanes, a_lanes] = [lanes(u), lanes(v), lanes(a)];
-        let [[s0, s1], [t0, t1]] = groups.of_sets;
-        let (zero, one) = (V::constant(0.0), V::constant(1.0));
-        let (left, below) = (u_lanes.cmp_lt(zero), v_lanes.cmp_lt(zero));
-        let least = u_lanes.mul_add(select(left, s1, s0), v_lanes.mul_add(select(below, t1, t0), a_lanes));
-        let most = u_lanes.mul_add(select(left, s0, s1), v_lanes.mul_add(select(below, t0, t1), a_lanes));
-        let wide = V::splat(groups.wide);
-        let size = wide.mul_add(u_lanes.abs() + v_lanes.abs(), a_lanes.abs());
-        let (least, most) = (least - size * V::splat(ROUNDING), most + size * V::splat(ROUNDING));
-        let (forwards, backwards) = (zero.cmp_lt(least).bits(), most.cmp_lt(zero).bits());
-        let (by_least, by_most) = (one / least, one / most);
-        let is_back = most.cmp_lt(zero);
-        let near = select(is_back, by_least, by_most) * V::splat(1.0 - ROUNDING);
-        let far = select(is_back, by_most, by_least) * V::splat(1.0 + ROUNDING);
+        let Ends { near, far, forwards, backwards } = Ends::of(columns.map(lanes), groups.of_sets, groups.wide);
         let sets = (1u32 << N) - 1;
         let all = |bits: u32, axis: usize| bits >> (SETS * axis) & sets == sets;
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
         // What rounds in the frame, taken into space.
-        let [mu, mv, ma] = frame.axes.map(|n| margin * (sum(n) + groups.wide * sum(frame.axes[2])) + 2.0 * groups.slack);
-        let (mu, mv) = (mu + 2.0 * groups.wide * groups.slack, mv + 2.0 * groups.wide * groups.slack);
-        let mut spans = Self {
-            backwards: [false; 3],
-            margin: each(|x| u[x].abs() * mu + v[x].abs() * mv + a[x].abs() * ma),
-            near: bytemuck::cast(near.to_array()),
-            far: bytemuck::cast(far.to_array()),
-            beyond: [0.0; 3],
-        };
-        for axis in 0..3 {
-            spans.backwards[axis] = all(backwards, axis);
-            if !(all(forwards | backwards, axis) && (all(forwards, axis) || all(backwards, axis)) && size_is_finite(u, v, a)) {
-                (spans.near[axis], spans.far[axis], spans.beyond[axis]) = ([0.0; SETS], [0.0; SETS], f32::INFINITY);
-            }
+        let slack = 2.0 * groups.slack * (1.0 + groups.wide);
+        let rounding = frame.axes.map(|n| margin * (sum(n) + groups.wide * sum(frame.axes[2])) + slack);
+        let margin = each(|x| (0..3).map(|k| columns[k][x].abs() * rounding[k]).sum::<f32>());
+        let (near, far) = (bytemuck::cast(near.to_array()), bytemuck::cast(far.to_array()));
+        let backwards: [bool; 3] = each(|axis| all(backwards, axis));
+        let mut spans = Self { backwards, margin, near, far, beyond: [0.0; 3] };
+        let is_finite = columns.as_flattened().iter().all(|x| x.is_finite());
+        for axis in (0..3).filter(|&axis| !(is_finite && (all(forwards, axis) || backwards[axis]))) {
+            (spans.near[axis], spans.far[axis]) = ([0.0; SETS], [0.0; SETS]);
+            spans.beyond[axis] = f32::INFINITY;
         }
         spans
+    }
+
+    /// Per axis, whether directions are negative; `None` if along some axis a part of them is.
+    #[inline(always)]
+    pub fn backwards(&self) -> Option<[bool; 3]> {
+        self.beyond.iter().all(|beyond| *beyond == 0.0).then_some(self.backwards)
     }
 
     /// Which of a node's boxes, as seen from the apex, the `N` sets may meet.
@@ -105,10 +123,6 @@ impl Spans {
         }
         met
     }
-}
-
-fn size_is_finite(u: [f32; 3], v: [f32; 3], a: [f32; 3]) -> bool {
-    u.iter().chain(&v).chain(&a).all(|x| x.is_finite())
 }
 
 /// The sets that meet `child`, as groups.

@@ -125,7 +125,8 @@ fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool
         let node = &nodes[level.node as usize];
         let child = node.child(slot);
         if met != 0 && (memory.slabs.wanted::<ANY>(met) || leaves.is_dear(child, met, memory.slabs.pay())) {
-            met = memory.slabs.test(&memory.groups, exact.bundle, &view.space, &node.child_bounds(slot), met);
+            let rays = (exact.bundle, &view.space, &view.planes.spans);
+            met = memory.slabs.test(&memory.groups, rays, &node.child_bounds(slot), met);
         }
         if met == 0 {
             continue;
