@@ -131,3 +131,82 @@ pub fn groups_of(met: Met, child: usize) -> u64 {
     const FIRST: u64 = 0x0001_0001_0001_0001;
     (met >> child & FIRST) * 0xffff
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_ray_meets_is_met_by_its_set() {
+        let mut state = 7u64;
+        let mut number = |size: f32| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            size * ((state >> 40) as f32 / 16_777_216.0 - 0.5)
+        };
+        let (mut met_boxes, mut missed, mut mixed) = (0, 0, 0);
+        for round in 0..400 {
+            let axes = each(|_| each(|_| number(2.0)));
+            let rows = axes.map(|axis| DVec3::from(axis.map(f64::from)));
+            let matrix = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
+            // Axes that hardly differ have large components of directions, which is another matter.
+            if matrix.determinant().abs() < 0.05 {
+                continue;
+            }
+            let frame = Frame { apex: [0.0; 3], axes, scale: 1.0, extent: 4.0 };
+            let mut groups = Box::<Groups>::default();
+            let sets: [[[f32; 2]; 2]; SETS] = std::array::from_fn(|_| {
+                [0, 1].map(|_| {
+                    let (low, size) = (number(0.4), if round % 2 == 0 { 0.05 } else { 0.5 });
+                    [low, low + size * (0.5 + number(1.0))]
+                })
+            });
+            let side = |axis: usize, end: usize| V::new(std::array::from_fn(|i| sets[i % SETS][axis][end]));
+            groups.of_sets = [0, 1].map(|axis| [side(axis, 0), side(axis, 1)]);
+            groups.wide = sets.as_flattened().as_flattened().iter().fold(0.0, |wide, x| x.abs().max(wide));
+            let spans = Spans::of::<SETS>(&groups, &frame, 1e-6);
+            mixed += usize::from(spans.backwards().is_none());
+            let boxes: [[[f32; 3]; 2]; Children::N] = std::array::from_fn(|_| {
+                let centre: [f32; 3] = each(|_| number(4.0));
+                let half: [f32; 3] = each(|_| number(1.0).abs());
+                [each(|a| centre[a] - half[a]), each(|a| centre[a] + half[a])]
+            });
+            let planes = |end: usize| {
+                each(|a| Children::load(&std::array::from_fn::<_, 16, _>(|k| boxes[k % boxes.len()][end][a])))
+            };
+            let met = spans.met::<SETS>(&planes(0), &planes(1));
+            for (child, [lo, hi]) in boxes.iter().enumerate() {
+                for (q, set) in sets.iter().enumerate() {
+                    let said = groups_of(met, child) >> (SET * q) & 0xffff;
+                    assert!(said == 0 || said == 0xffff);
+                    let is_met = (0..200).any(|_| {
+                        let [s, t] = [0, 1].map(|axis| {
+                            let [low, high] = set[axis];
+                            f64::from(low + (high - low) * (0.5 + number(1.0)))
+                        });
+                        let way = matrix.inverse() * DVec3::new(s, t, 1.0);
+                        let ends = |a: usize| {
+                            let [x, y] = [lo[a], hi[a]].map(|plane| f64::from(plane) / way[a]);
+                            [x.min(y), x.max(y)]
+                        };
+                        let enter = (0..3).fold(0.0, |enter, a| ends(a)[0].max(enter));
+                        (0..3).all(|a| ends(a)[1] >= enter)
+                    });
+                    met_boxes += usize::from(is_met);
+                    missed += usize::from(said == 0);
+                    assert!(!is_met || said != 0, "round {round}, child {child}, set {q}");
+                }
+            }
+        }
+        assert!(met_boxes > 400 && missed > 10_000 && mixed > 100, "{met_boxes} {missed} {mixed}");
+    }
+
+    #[test]
+    fn of_flat_frames_nothing_is_said() {
+        let frame = Frame { apex: [0.0; 3], axes: [[1.0, 0.0, 0.0]; 3], scale: 1.0, extent: 1.0 };
+        let spans = Spans::of::<SETS>(&Box::<Groups>::default(), &frame, 0.0);
+        assert_eq!(spans.backwards(), None);
+        let zero = each(|_| <Children as Lanes>::splat(-1.0));
+        let children = (1u64 << Children::N) - 1;
+        assert_eq!(spans.met::<1>(&zero, &zero) & children, children);
+    }
+}
