@@ -9,7 +9,10 @@ use std::f32::consts::PI;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::Job;
+use super::groups::Groups;
+use super::{Job, SET, V};
+use crate::lanes::{Lanes, dot, each};
+use crate::math::Aabb;
 use crate::ray::{Counters, HitPacket, INVALID_ID, Packet};
 use crate::trace::query::Query;
 use crate::trace::traverse;
@@ -58,5 +61,29 @@ impl Job<'_> {
         let size =
             0.5 * (q.truncate() / q.z - p.truncate() / p.z).perp_dot(r.truncate() / r.z - p.truncate() / p.z).abs();
         p.z.min(q.z).min(r.z) > 0.0 && spacing > DENSE * size
+    }
+}
+
+impl Groups {
+    /// About how many rays, as dense as those of the tile, a box in world space would be met by; infinite if the common
+    /// point is as close to the box as that is large.
+    #[inline(always)]
+    pub fn rays_on<const N: usize>(&self, bounds: &Aabb<f32>) -> f32 {
+        let centre = each(|a| 0.5 * (bounds.lo[a] + bounds.hi[a]) - self.frame.apex[a]);
+        let half: [f32; 3] = each(|a| 0.5 * (bounds.hi[a] - bounds.lo[a]));
+        let depth = dot(centre, self.frame.axes[2]);
+        let square = dot(half, half) * self.frame.scale * self.frame.scale;
+        if depth * depth <= square || depth <= 0.0 {
+            return f32::INFINITY;
+        }
+        // Half of the square around the sphere around it: a guess.
+        2.0 * square / (depth * depth) / self.spacing::<N>()
+    }
+
+    /// What of the plane at depth 1 a ray of the tile has for itself.
+    #[inline(always)]
+    pub fn spacing<const N: usize>(&self) -> f32 {
+        let [s, t] = self.bounds.map(|[lo, hi]| hi - lo);
+        s * t / (N * SET * V::N) as f32
     }
 }

@@ -52,6 +52,7 @@ impl Frame {
         let [sum, across, along] = Self::mean_direction::<N>(bundle, rays, groups);
         let a = normalised(sum)?;
         let flat = |r: [f64; 3]| sub(r, a.map(|x| x * dot(r, a)));
+        // A light may see pixels as flat parallelograms: rectangles fit them best along their longer side.
         let (across, along) = (flat(across), flat(along));
         let long = if dot(across, across) < dot(along, along) { along } else { across };
         // One direction, or directions on a line through the apex: any perpendicular axis does.
@@ -65,7 +66,7 @@ impl Frame {
     }
 
     /// Sum of unit directions of a sample of the rays, and the same with the left half of the picture negative, and the upper half.
-    /// The order of rays in a block (Morton) says what is left; where it is another order, nothing but the fit of
+    /// The order of rays in a block (Morton) says what is left and above; where it is another order, nothing but the fit of
     /// the rectangles gets worse.
     #[inline(always)]
     fn mean_direction<const N: usize>(bundle: &Bundle, rays: &Rays<f32>, groups: u64) -> [[f64; 3]; 3] {
@@ -96,7 +97,8 @@ impl Frame {
         let length = dot(sample, sample).sqrt();
         let used = Mask::from_bits(used) & V::constant(0.0).cmp_lt(length);
         let scale = select(used, V::constant(1.0) / length, V::constant(0.0));
-        // Number i of sixteen parts of a block has its second bit of x, of a quarter its first one, at i & 4 and i & 1.
+        // Number i of sixteen parts of a block has its second bit of x, of a quarter its first one, at i & 4 and i & 1; the bit
+        // of y comes next.
         let quarter = groups & (groups - 1) != 0 && (0..4).any(|q| groups & !(0xf << (4 * q)) == 0);
         let bit = if quarter { 1 } else { 4 };
         let unit = map3(sample, |x| select(used, x * scale, V::constant(0.0)).to_array());

@@ -322,28 +322,6 @@ impl Groups {
         t + from
     }
 
-    /// About how many rays, as dense as those of the tile, a box in world space would be met by; infinite if the common
-    /// point is as close to the box as that is large.
-    #[inline(always)]
-    pub fn rays_on<const N: usize>(&self, bounds: &Aabb<f32>) -> f32 {
-        let centre = each(|a| 0.5 * (bounds.lo[a] + bounds.hi[a]) - self.frame.apex[a]);
-        let half: [f32; 3] = each(|a| 0.5 * (bounds.hi[a] - bounds.lo[a]));
-        let depth = dot(centre, self.frame.axes[2]);
-        let square = dot(half, half) * self.frame.scale * self.frame.scale;
-        if depth * depth <= square || depth <= 0.0 {
-            return f32::INFINITY;
-        }
-        // Half of the square around the sphere around it: a guess.
-        2.0 * square / (depth * depth) / self.spacing::<N>()
-    }
-
-    /// What of the plane at depth 1 a ray of the tile has for itself.
-    #[inline(always)]
-    pub fn spacing<const N: usize>(&self) -> f32 {
-        let [s, t] = self.bounds.map(|[lo, hi]| hi - lo);
-        s * t / (N * SET * V::N) as f32
-    }
-
     /// The smallest values of some linear functions over the tile's rectangle.
     #[inline(always)]
     pub fn smallest(&self, f: &Lanes3<V>) -> V {
