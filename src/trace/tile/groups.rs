@@ -9,8 +9,7 @@ use super::presumed::Look;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::minima::{quarter_minima, quarters, row_minima_of};
 use crate::lanes::words::{greatest, least};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
-use crate::math::Aabb;
+use crate::lanes::{LaneMask, Lanes, Lanes3, map3};
 use crate::scene::world::World;
 
 /// Widest tile: |s| and |t| below this (83 degrees off the axis).
