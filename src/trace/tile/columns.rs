@@ -2,12 +2,12 @@
 //!
 //! A group is a line of the cache in each of eight columns, and a core waits for a few dozen lines at most at once. So a block's
 //! rays would be waited for if they were asked for while they are read; they are asked for while the tile before them goes through
-//! the tree, which itself asks for little.
+//! the tree, which itself asks for little: not while its answers are written, since these wait for the memory, too.
 
 use std::cell::Cell;
 
 use super::{GROUPS, SET, SETS, V};
-use crate::lanes::words::prefetch;
+use crate::lanes::words::prefetch_for_later;
 use crate::lanes::{Column, Lanes, Lanes3};
 use crate::ray::{Packet, Rays};
 
@@ -66,7 +66,7 @@ impl<'a> Columns<'a> {
     pub fn prefetch(&self, i: usize) {
         let Self { org: [x, y, z], dir: [dx, dy, dz], t_min, t_max } = *self;
         for column in [x, y, z, dx, dy, dz, t_min, t_max] {
-            prefetch(column, i);
+            prefetch_for_later(column, i);
         }
     }
 }

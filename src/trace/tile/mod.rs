@@ -317,7 +317,6 @@ impl<'a> Job<'a> {
         let exact = Exact { bundle, world: self.world, object: self.world.first_object(), next };
         walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
-            exact.next.ask();
             if !self.past {
                 self.output.prefetch(bundle.first + (g + AHEAD) * V::N);
             }
