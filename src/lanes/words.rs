@@ -33,31 +33,31 @@ pub fn below(number: u32, list: &[u32; 16]) -> u32 {
 /// Asks the memory for element `i` of a list, which is wanted soon. Changes nothing but the time that takes.
 #[inline(always)]
 pub fn prefetch<T>(list: &[T], i: usize) {
-    #[cfg(target_arch = "x86_64")]
-    ask::<T, { std::arch::x86_64::_MM_HINT_T0 }>(list, i);
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (list, i);
+    ask::<T, false>(list, i);
 }
 
 /// The same of what is wanted later: as far as the second cache, so that it drives nothing out of the first.
 #[inline(always)]
 pub fn prefetch_for_later<T>(list: &[T], i: usize) {
-    #[cfg(target_arch = "x86_64")]
-    ask::<T, { std::arch::x86_64::_MM_HINT_T1 }>(list, i);
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (list, i);
+    ask::<T, true>(list, i);
 }
 
-#[cfg(target_arch = "x86_64")]
 #[inline(always)]
-fn ask<T, const HINT: i32>(list: &[T], i: usize) {
+fn ask<T, const LATER: bool>(list: &[T], i: usize) {
+    #[cfg(target_arch = "x86_64")]
     if let Some(element) = list.get(i) {
+        use std::arch::x86_64::{_MM_HINT_T0, _MM_HINT_T1, _mm_prefetch};
         let first = (&raw const *element).cast::<i8>();
         for line in (0..size_of::<T>()).step_by(64) {
             // SAFETY: the address lies within `element`; a prefetch reads nothing the program can see.
-            unsafe { std::arch::x86_64::_mm_prefetch::<HINT>(first.add(line)) };
+            unsafe {
+                let line = first.add(line);
+                if LATER { _mm_prefetch::<_MM_HINT_T1>(line) } else { _mm_prefetch::<_MM_HINT_T0>(line) }
+            }
         }
     }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (list, i);
 }
 
 /// [`prefetch`] from either of two lists, without a branch: which one is usually a surprise.
