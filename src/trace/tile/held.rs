@@ -33,6 +33,16 @@ impl Line {
     }
 }
 
+/// `best`, or in some lanes what they found if that is greater. Nothing is negative.
+#[inline(always)]
+fn raised(best: V, lanes: Mask, found: V) -> V {
+    // Where a comparison is a register of its own one operation does it; else clearing costs less than choosing.
+    match cfg!(target_feature = "avx512f") {
+        true => select(lanes, found.fast_max(best), best),
+        false => select(lanes, found, V::constant(0.0)).fast_max(best),
+    }
+}
+
 /// A triangle's edges against some rays.
 pub struct Edges {
     /// Lanes not surely outside.
@@ -157,7 +167,7 @@ impl Plane {
                 (possible, certain) = (possible & is_ahead, certain & is_ahead);
             }
             let waiting = line.best.cmp_lt(infinite);
-            let best = select(certain, infinite, zero).fast_max(line.best);
+            let best = raised(line.best, certain, infinite);
             return Met { hit: certain & waiting, possible: possible & waiting, best, weights, ahead };
         }
         let inverse = self.depth(line);
@@ -172,11 +182,11 @@ impl Plane {
         possible = possible & line.best.cmp_le(inverse);
         if ANY {
             let hit = certain & possible;
-            let best = select(hit, infinite, zero).fast_max(line.best);
+            let best = raised(line.best, hit, infinite);
             return Met { hit, possible, best, weights, ahead };
         }
         let hit = certain & line.best.cmp_lt(inverse);
-        let best = select(certain, inverse, zero).fast_max(line.best);
+        let best = raised(line.best, certain, inverse);
         Met { hit, possible, best, weights, ahead }
     }
 }

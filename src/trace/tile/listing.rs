@@ -6,7 +6,7 @@
 use super::batch::{BATCH, Planes};
 use super::groups::Groups;
 use super::held::Plane;
-use super::{GROUPS, SET, SETS, V, select};
+use super::{GROUPS, SET, SETS, V};
 use crate::lanes::chosen::lanes_of;
 use crate::lanes::marks::words_with;
 use crate::lanes::{LaneMask, Lanes, each};
@@ -145,7 +145,9 @@ impl Listing {
         let linear = |k: usize| each(|x| V::load(&planes.linear[k][x]));
         let linear = [linear(0), linear(1), linear(2), linear(3)];
         let zero = V::constant(0.0);
-        let falling = linear.map(|[x, y, _]: [V; 3]| [x.cmp_lt(zero), y.cmp_lt(zero)]);
+        // Of each product with an end of the rectangle one is zero: sums are those with the one that is greater.
+        let split = linear
+            .map(|[x, y, z]: [V; 3]| ([x.fast_max(zero), x.fast_min(zero)], [y.fast_max(zero), y.fast_min(zero)], z));
         let (outside, most) = (V::load(&planes.outside), V::load(&planes.most));
         let (nearest, farthest) = (V::load(&planes.nearest), V::load(&planes.farthest));
         let wild = if EXACT { 0 } else { planes.wild };
@@ -159,9 +161,8 @@ impl Listing {
             rest &= rest - 1;
             let (s0, s1, t0, t1) = (V::splat(low_s[g]), V::splat(high_s[g]), V::splat(low_t[g]), V::splat(high_t[g]));
             let largest = |k: usize| {
-                let [x, y, z]: [V; 3] = linear[k];
-                let [is_low_s, is_low_t] = falling[k];
-                x.mul_add(select(is_low_s, s0, s1), y.mul_add(select(is_low_t, t0, t1), z))
+                let ([x1, x0], [y1, y0], z) = split[k];
+                x1.mul_add(s1, x0.mul_add(s0, y1.mul_add(t1, y0.mul_add(t0, z))))
             };
             let edge = largest(0).fast_min(largest(1)).fast_min(largest(2));
             let inverse = largest(3);
