@@ -12,7 +12,7 @@ use lanecast::render::{RenderOptions, Silent, render};
 use lanecast::scene::description::Description;
 use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::world::{Preset, World};
-use lanecast::trace::Engines;
+use lanecast::shade::Shades;
 
 const WIDTH: usize = 240;
 const HEIGHT: usize = 180;
@@ -64,7 +64,7 @@ fn theirs(program: &str, name: &str, declares: &[&str]) -> (Picture, usize) {
 }
 
 /// Our picture, and which pixels hit something.
-fn ours<S: Engines>(d: &Description) -> (Picture, Vec<bool>) {
+fn ours<S: Shades>(d: &Description) -> (Picture, Vec<bool>) {
     let world = World::<S>::compile(d, Preset::Balanced).unwrap();
     let camera = Camera::new(&d.cameras[0], WIDTH as f64 / HEIGHT as f64).unwrap();
     let options = RenderOptions { width: WIDTH as u32, height: HEIGHT as u32, ..RenderOptions::default() };

@@ -16,8 +16,8 @@ use crate::render::RenderOptions;
 use crate::render::progressive::LARGEST_BLOCK;
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
-use crate::shade::Integrator;
-use crate::trace::{EXACT_ENGINE, Engines};
+use crate::shade::{Integrator, Shades};
+use crate::trace::EXACT_ENGINE;
 use crate::view::action::View;
 use crate::view::meshes::Meshes;
 use crate::view::reload::{Setting, Source};
@@ -125,7 +125,7 @@ fn source(args: &SceneArgs) -> Result<Source> {
     Source::new(Box::new(open), file.as_deref())
 }
 
-fn stage<S: Engines>(
+fn stage<S: Shades>(
     options: &SceneOptions,
     description: Description,
     before: Option<&dyn Stage>,

@@ -9,7 +9,8 @@ use crate::render::progressive::{LARGEST_BLOCK, Progressive};
 use crate::render::{Progress, RenderOptions, RenderOutput, render_with};
 use crate::scene::description::Description;
 use crate::scene::world::World;
-use crate::trace::{Engine, Engines};
+use crate::shade::Shades;
+use crate::trace::Engine;
 use crate::view::term::Terminal;
 use crate::view::tev::{DEFAULT_ADDRESS, Tev};
 use crate::view::window::live::Live;
@@ -53,7 +54,7 @@ impl PreviewArgs {
 }
 
 /// A picture to be made, and how it is shown.
-pub(super) struct Job<'a, S: Engines> {
+pub(super) struct Job<'a, S: Shades> {
     pub engine: &'a dyn Engine<S>,
     pub world: &'a World<S>,
     pub description: &'a Description,
@@ -66,7 +67,7 @@ pub(super) struct Job<'a, S: Engines> {
     pub output: &'a OutputArgs,
 }
 
-impl<S: Engines> Job<'_, S> {
+impl<S: Shades> Job<'_, S> {
     /// Renders, shown as `how` says. A place where nothing can be shown is a line on stderr, and the render goes on. A
     /// window that was opened comes back with the picture.
     ///
@@ -135,7 +136,7 @@ impl<S: Engines> Job<'_, S> {
     }
 }
 
-fn unseen<S: Engines>(mut picture: Progressive<'_, S>, progress: &dyn Progress) -> RenderOutput {
+fn unseen<S: Shades>(mut picture: Progressive<'_, S>, progress: &dyn Progress) -> RenderOutput {
     picture.run(progress, &());
     picture.finish()
 }

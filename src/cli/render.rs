@@ -22,8 +22,7 @@ use crate::render::{Aov, Progress, RenderOptions};
 use crate::scene::description::{Description, Precision};
 use crate::scene::load::{ReadMesh, read_mesh};
 use crate::scene::world::World;
-use crate::shade::{Integrator, unknown_shaders};
-use crate::trace::Engines;
+use crate::shade::{Integrator, Shades, unknown_shaders};
 
 /// Picture size unless `--size` says otherwise.
 const DEFAULT_SIZE: (u32, u32) = (960, 540);
@@ -211,7 +210,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     })
 }
 
-fn compiled<S: Engines>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
+fn compiled<S: Shades>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
     args.engine.find::<S>()?;
     let world = World::<S>::compile(description, args.scene.options.build())?;
     picture(args, description, options, &world, true)
@@ -287,7 +286,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
 }
 
 /// Renders and writes one picture. If `partly`, also one that was stopped, as far as it got.
-fn picture<S: Engines>(
+fn picture<S: Shades>(
     args: &RenderArgs,
     description: &Description,
     options: &RenderOptions,

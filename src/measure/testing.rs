@@ -7,7 +7,7 @@ use crate::ray::{Counters, Hits, Rays};
 use crate::scene::assembly::Assembly;
 use crate::scene::description::{Description, Item, ItemKind};
 use crate::scene::mesh::Mesh;
-use crate::scene::world::{Preset, World};
+use crate::scene::world::{Compiles, Preset, World};
 use crate::trace::{Engine, Scratch};
 
 /// Hits the plane z = 0 from above: t = -oz / dz, u = ox.
@@ -85,7 +85,7 @@ impl<S: Real> Engine<S> for Slab<'_> {
 }
 
 /// A world that [`Slab`] ignores.
-pub fn empty_world<S: Real>() -> World<S> {
+pub fn empty_world<S: Compiles>() -> World<S> {
     World::compile(&Description::new("empty"), Preset::Fast).unwrap()
 }
 

@@ -9,7 +9,7 @@ use crate::camera::{
 };
 use crate::lanes::Real;
 use crate::ray::Rays;
-use crate::shade::{Samples, Shader, Spots, Workspace};
+use crate::shade::{Samples, Shader, Shades, Spots, Workspace};
 
 /// What is seen, and how it is cut into tiles.
 pub(super) struct Canvas<'a> {
@@ -58,7 +58,7 @@ impl Canvas<'_> {
     }
 
     /// Traces the samples `numbers` of the pixels of a tile as one batch into `memory.samples`.
-    pub fn shade<S: Real>(
+    pub fn shade<S: Shades>(
         &self,
         shader: &Shader<'_, S>,
         tile: u32,
@@ -88,7 +88,7 @@ impl Canvas<'_> {
     }
 
     /// Traces the first sample of each of the pixels of `memory`.
-    pub fn shade_pixels<S: Real>(&self, shader: &Shader<'_, S>, memory: &mut Memory<S>) {
+    pub fn shade_pixels<S: Shades>(&self, shader: &Shader<'_, S>, memory: &mut Memory<S>) {
         let Memory { rays, pixels, samples, work, .. } = memory;
         let size = (self.tiling.width(), self.tiling.height());
         fill_pixels(self.camera, size, pixels, self.options.sub_pixel(0), rays);

@@ -15,12 +15,11 @@ use crate::camera::Camera;
 use crate::error::{Result, locked};
 use crate::film::Film;
 use crate::film::Window;
-use crate::lanes::Real;
 use crate::ray::Counters;
 use crate::scene::description::Description;
 use crate::scene::world::World;
-use crate::shade::{PathStats, RayCounts, Shader, headlight};
-use crate::trace::{Engine, Engines, engine};
+use crate::shade::{PathStats, RayCounts, Shader, Shades, headlight};
+use crate::trace::{Engine, engine};
 
 /// Samples per pixel of the first round when the number is found while rendering; then it doubles.
 const FIRST_ROUND: u32 = 4;
@@ -59,7 +58,7 @@ impl RenderOutput {
 ///
 /// # Errors
 /// Options out of range; an unknown engine.
-pub fn render<S: Engines>(
+pub fn render<S: Shades>(
     world: &World<S>,
     description: &Description,
     camera: &Camera,
@@ -73,7 +72,7 @@ pub fn render<S: Engines>(
 ///
 /// # Errors
 /// Options out of range.
-pub fn render_with<S: Real>(
+pub fn render_with<S: Shades>(
     engine: &dyn Engine<S>,
     world: &World<S>,
     description: &Description,
@@ -133,7 +132,7 @@ pub fn render_with<S: Real>(
 }
 
 /// What all tiles of a render share.
-struct Job<'a, S: Real> {
+struct Job<'a, S: Shades> {
     shader: Shader<'a, S>,
     canvas: Canvas<'a>,
     window: Window,
@@ -163,7 +162,7 @@ impl Tile {
     }
 }
 
-impl<S: Real> Job<'_, S> {
+impl<S: Shades> Job<'_, S> {
     /// Whether there is nothing to sum up: a tile is painted from its only samples.
     fn is_of_one_sample(&self) -> bool {
         self.canvas.options.spp == 1 && !self.canvas.options.is_adaptive()

@@ -10,6 +10,7 @@ mod bare;
 mod branches;
 mod classic;
 mod colors;
+mod compiled;
 mod glow;
 mod integrator;
 mod lights;
@@ -31,6 +32,7 @@ mod void;
 mod whitted;
 
 pub use colors::Colors;
+pub use compiled::Shades;
 pub use integrator::Integrator;
 pub use lights::headlight;
 pub use offset::{offset_origin, position_error};

@@ -185,9 +185,15 @@ impl<'a, S: Real> Shader<'a, S> {
         if self.paths.is_some() { done.clamp(1, PASSES) } else { 1 }
     }
 
-    /// What each ray of the primary batch `rays`, of which `live` are, sees, into `out` (made as long as the batch). Ray `i` is sample
-    /// `spots.at(i)`. Dead rays see nothing. What the batch is afterwards is unspecified.
-    pub fn shade(&self, rays: &mut Rays<S>, live: u64, spots: Spots<'_>, work: &mut Workspace<S>, out: &mut Samples) {
+    /// See [`Shader::shade`].
+    pub(super) fn batch(
+        &self,
+        rays: &mut Rays<S>,
+        live: u64,
+        spots: Spots<'_>,
+        work: &mut Workspace<S>,
+        out: &mut Samples,
+    ) {
         let shows_hits = self.shows_hits();
         work.clock.start(&work.rays);
         work.rays.primary += live;

@@ -12,9 +12,8 @@ use crate::lanes::Real;
 use crate::trace::is_void;
 
 impl<S: Real> Shader<'_, S> {
-    /// What all of `count` rays see whose origins and directions lie in `range`, into `out`, as [`Self::shade`] does; false where
-    /// they may meet something, or need not see the same. They count as traced: that they meet nothing is known.
-    pub fn shade_void(&self, range: &Range<S>, count: u64, work: &mut Workspace<S>, out: &mut Samples) -> bool {
+    /// See [`Shader::shade_void`].
+    pub(super) fn nothing(&self, range: &Range<S>, count: u64, work: &mut Workspace<S>, out: &mut Samples) -> bool {
         let Some(seen) = self.beyond_everywhere() else { return false };
         let [org, dir] = *range;
         work.clock.start(&work.rays);

@@ -21,7 +21,7 @@ use std::marker::PhantomData;
 use crate::error::{Error, Result, nearest_name};
 use crate::lanes::{Lanes, Pair, Real, f32x4, f32x8, f32x16, f64x2, f64x4, f64x8};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Pencil, Rays};
-use crate::scene::world::World;
+use crate::scene::world::{Compiles, World};
 pub use all::{Stretch, stretches};
 use query::{Query, Stack};
 pub use void::is_void;
@@ -91,8 +91,9 @@ pub trait Engine<S: Real>: Sync {
     );
 }
 
-/// A scalar type with its list of engines.
-pub trait Engines: Real {
+/// A scalar type with its list of engines. Lists are never taken over into other crates, as the compiler would do with such short
+/// functions: what is listed would be compiled there once more.
+pub trait Engines: Compiles {
     /// `f32` or `f64`.
     const PRECISION: &'static str;
     /// All engines of this precision, baselines first.
@@ -108,6 +109,7 @@ pub trait Engines: Real {
 impl Engines for f32 {
     const PRECISION: &'static str = "f32";
 
+    #[inline(never)]
     fn engines() -> &'static [&'static dyn Engine<Self>] {
         &[
             &Generic::<f32, false>("brute", PhantomData),
@@ -121,6 +123,7 @@ impl Engines for f32 {
         ]
     }
 
+    #[inline(never)]
     fn variants() -> &'static [&'static dyn Engine<Self>] {
         &[&tile::Tile::SMALL, &tile::Tile::MEDIUM, &tile::Tile::LARGE]
     }
@@ -133,6 +136,7 @@ impl Engines for f32 {
 impl Engines for f64 {
     const PRECISION: &'static str = "f64";
 
+    #[inline(never)]
     fn engines() -> &'static [&'static dyn Engine<Self>] {
         &[
             &Generic::<f64, false>("brute", PhantomData),

@@ -11,7 +11,8 @@ use crate::film::heat;
 use crate::ray::{Counters, Hits, Rays};
 use crate::render::{Progress, RenderOptions, RenderOutput};
 use crate::scene::world::World;
-use crate::trace::{Engine, Engines, Scratch};
+use crate::shade::Shades;
+use crate::trace::{Engine, Scratch};
 
 /// Rays of a block: 16 consecutive ones in Morton order.
 const BLOCK: usize = 16;
@@ -66,7 +67,7 @@ impl std::str::FromStr for Heat {
 ///
 /// # Errors
 /// Options out of range.
-pub(super) fn render<S: Engines>(
+pub(super) fn render<S: Shades>(
     map: Heat,
     engine: &dyn Engine<S>,
     world: &World<S>,
@@ -132,14 +133,14 @@ struct Memory<S> {
     values: Vec<f32>,
 }
 
-impl<S: Engines> Default for Memory<S> {
+impl<S: Shades> Default for Memory<S> {
     fn default() -> Self {
         let (rays, block, hits) = (Rays::new(0), Rays::new(0), Hits::new(0));
         Self { rays, block, hits, scratch: Scratch::default(), values: Vec::new() }
     }
 }
 
-impl<S: Engines> Memory<S> {
+impl<S: Shades> Memory<S> {
     fn tile(
         &mut self,
         map: Heat,

@@ -12,7 +12,8 @@ use crate::render::progressive::{Progressive, Viewer};
 use crate::render::{Progress, RenderOptions, RenderOutput};
 use crate::scene::description::{CameraDescription, Description};
 use crate::scene::world::World;
-use crate::trace::{Engines, Scratch, engine};
+use crate::shade::Shades;
+use crate::trace::{Scratch, engine};
 
 /// What is looked at, and how.
 #[derive(Clone, Debug)]
@@ -96,7 +97,7 @@ pub struct Scene<S> {
     pub world: World<S>,
 }
 
-impl<S: Engines> Stage for Scene<S>
+impl<S: Shades> Stage for Scene<S>
 where
     World<S>: Send + Sync,
 {

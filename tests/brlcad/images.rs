@@ -10,8 +10,7 @@ use lanecast::scene::brlcad::describe::{Options, describe};
 use lanecast::scene::brlcad::view::{self, View};
 use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::world::{Preset, World};
-use lanecast::shade::Integrator;
-use lanecast::trace::Engines;
+use lanecast::shade::{Integrator, Shades};
 
 use crate::brlcad_support;
 use brlcad_support::shared;
@@ -23,7 +22,7 @@ const OFF_BY_MANY: f64 = 0.001;
 const F32_OFF_BY_MANY: f64 = 0.005;
 
 /// The picture of `name` below `top` in the precision `S` as the bytes of a `.pix` file.
-fn picture<S: Engines>(name: &str, top: &str) -> Option<Vec<u8>> {
+fn picture<S: Shades>(name: &str, top: &str) -> Option<Vec<u8>> {
     let (db, script) = (shared(&format!("db/{name}.asc"))?, shared(&format!("views/{name}.rt"))?);
     let brlcad = Options { tops: vec![top.into()], lenient: false };
     let description = load(db.to_str().unwrap(), &LoadOptions { brlcad, ..Default::default() }).unwrap();
@@ -98,7 +97,7 @@ fn star_and_m35_render() {
 
 /// Colour of the middle of a small picture of `text`, seen from `eye` with the orientation `turn` (a quaternion), and how many
 /// of its pixels are otherwise.
-fn middle<S: Engines>(text: &str, eye: &str, turn: &str) -> ([u8; 3], usize) {
+fn middle<S: Shades>(text: &str, eye: &str, turn: &str) -> ([u8; 3], usize) {
     let file = Path::new("d.asc");
     let database = brlcad::parse(file, text.as_bytes()).unwrap();
     let description = describe(file, "d", &database, &Options::default()).unwrap();
@@ -114,7 +113,7 @@ fn middle<S: Engines>(text: &str, eye: &str, turn: &str) -> ([u8; 3], usize) {
 }
 
 /// What surrounds a thing is the same whether its tiles are shaded with their rays or without.
-fn surroundings_are_seen_without_rays<S: Engines>() {
+fn surroundings_are_seen_without_rays<S: Shades>() {
     let ball = "title {t}\nunits mm\nput b ell V {0 0 0} A {1 0 0} B {0 1 0} C {0 0 1}\n";
     let region = "put r comb region yes tree {l b}\n";
     let sky = "put s comb region yes shader {envmap cloud} tree {l b}\nput all comb region no tree {u {l r} {l s}}\n";

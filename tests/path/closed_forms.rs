@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 use glam::{DAffine3, DMat3, DVec3};
 use lanecast::scene::description::{Description, Light, Material, Shape};
 use lanecast::scene::material::{Alpha, Scattering};
-use lanecast::trace::Engines;
+use lanecast::shade::Shades;
 use path_support::{
     add, dark, facets, lamp, look, near, parallel, parallelogram, paths, plane, scatters, seen, shape, sphere, under,
 };
@@ -17,7 +17,7 @@ const RHO: f64 = 0.6;
 
 /// The plane z = 0, matte, and what else `build` makes; the radiance of the plane at the origin seen under 60
 /// degrees by paths of one scattering, as irradiance.
-fn irradiance<S: Engines>(spp: u32, build: impl Fn(&mut Description)) -> DVec3 {
+fn irradiance<S: Shades>(spp: u32, build: impl Fn(&mut Description)) -> DVec3 {
     let mut d = dark();
     let id = add(&mut d, Material { diffuse: DVec3::splat(RHO), ..Material::default() });
     plane(&mut d, 0.0, id);

@@ -6,7 +6,7 @@ use crate::path_support;
 use glam::DVec3;
 use lanecast::scene::description::{Description, Material};
 use lanecast::scene::material::Scattering;
-use lanecast::trace::Engines;
+use lanecast::shade::Shades;
 use path_support::{add, dark, facets, look, near, paths, picture, plane, scatters, seen, sphere, under, values};
 
 const SPP: u32 = 4096;
@@ -22,16 +22,16 @@ fn white(mut d: Description) -> Description {
 }
 
 /// What the plane z = 0 of `material` shows under `degrees` from its normal.
-fn albedo<S: Engines>(material: Material, degrees: f64) -> DVec3 {
+fn albedo<S: Shades>(material: Material, degrees: f64) -> DVec3 {
     by_pixels::<S>(material, degrees, 4)
 }
 
 /// The same from many pixels, where a path's choice of a lobe makes noise.
-fn many<S: Engines>(material: Material, degrees: f64) -> DVec3 {
+fn many<S: Shades>(material: Material, degrees: f64) -> DVec3 {
     by_pixels::<S>(material, degrees, 16)
 }
 
-fn by_pixels<S: Engines>(material: Material, degrees: f64, size: u32) -> DVec3 {
+fn by_pixels<S: Shades>(material: Material, degrees: f64, size: u32) -> DVec3 {
     let mut d = white(dark());
     let id = add(&mut d, material);
     plane(&mut d, 0.0, id);

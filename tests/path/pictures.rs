@@ -12,7 +12,7 @@ use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::material::{Alpha, Scattering, TextureRef};
 use lanecast::scene::texture::{Texels, Texture};
 use lanecast::scene::world::{Preset, World};
-use lanecast::trace::Engines;
+use lanecast::shade::Shades;
 use path_support::{add, dark, lamp, look, parallelogram, paths, picture, plane, scatters, shape, sphere, values};
 
 /// One sphere of each kind of scattering on a plane, under lights of every kind, with textures and holes.
@@ -79,7 +79,7 @@ fn bits(output: &RenderOutput) -> Vec<Vec<u32>> {
     output.film.planes.iter().map(|plane| plane_bits(&plane.data)).collect()
 }
 
-fn threads_and_tiles_change_nothing<S: Engines>() {
+fn threads_and_tiles_change_nothing<S: Shades>() {
     let d = gallery();
     let world = World::<S>::compile(&d, Preset::Balanced).unwrap();
     for (noise, spp) in [(None, 3), (Some(1e-9), 9)] {
@@ -184,7 +184,7 @@ fn no_pixel_of_a_built_in_scene_is_out_of_bounds() {
     }
 }
 
-fn seen_by_its_camera<S: Engines>(d: &Description, options: &RenderOptions) -> RenderOutput {
+fn seen_by_its_camera<S: Shades>(d: &Description, options: &RenderOptions) -> RenderOutput {
     let world = World::<S>::compile(d, Preset::Balanced).unwrap();
     let described = d.cameras.first().cloned().unwrap_or_else(|| framing(world.bounds(), 1.5));
     render(&world, d, &Camera::new(&described, 1.5).unwrap(), options, &Silent).unwrap()

@@ -17,8 +17,7 @@ use lanecast::scene::material::Scattering;
 use lanecast::scene::mesh::Mesh;
 use lanecast::scene::texture::{Texels, Texture};
 use lanecast::scene::world::{Preset, World};
-use lanecast::shade::Integrator;
-use lanecast::trace::Engines;
+use lanecast::shade::{Integrator, Shades};
 
 /// A black scene without light: no ambient light, no background; the headlight stays out by a light of no power.
 pub fn dark() -> Description {
@@ -112,7 +111,7 @@ pub fn paths(size: u32, spp: u32, depth: u32) -> RenderOptions {
 }
 
 /// The picture.
-pub fn picture<S: Engines>(d: &Description, camera: &Camera, options: &RenderOptions) -> RenderOutput {
+pub fn picture<S: Shades>(d: &Description, camera: &Camera, options: &RenderOptions) -> RenderOutput {
     let world = World::<S>::compile(d, Preset::Balanced).unwrap();
     let output = render(&world, d, camera, options, &Silent).unwrap();
     assert!(output.is_complete());
@@ -137,7 +136,7 @@ pub fn mean(film: &Film) -> DVec3 {
 }
 
 /// Mean colour that `camera` sees in `d`.
-pub fn seen<S: Engines>(d: &Description, camera: &Camera, options: &RenderOptions) -> DVec3 {
+pub fn seen<S: Shades>(d: &Description, camera: &Camera, options: &RenderOptions) -> DVec3 {
     mean(&picture::<S>(d, camera, options).film)
 }
 

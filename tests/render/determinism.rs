@@ -11,8 +11,7 @@ use lanecast::scene::description::{
     CameraDescription, Description, Item, ItemKind, Light, Material, Projection, Shape,
 };
 use lanecast::scene::world::{Preset, World};
-use lanecast::shade::Integrator;
-use lanecast::trace::Engines;
+use lanecast::shade::{Integrator, Shades};
 
 /// Spheres in a row on a plane, every second one a mirror.
 fn scene() -> Description {
@@ -46,7 +45,7 @@ fn options() -> RenderOptions {
     RenderOptions { width: 67, height: 45, spp: 3, ao_samples: 4, engine: "scalar".into(), aovs, ..Default::default() }
 }
 
-fn threads_and_tiles_change_nothing<S: Engines>() {
+fn threads_and_tiles_change_nothing<S: Shades>() {
     let d = scene();
     let world = World::<S>::compile(&d, Preset::Balanced).unwrap();
     let camera = Camera::new(&framing(world.bounds(), 67.0 / 45.0), 67.0 / 45.0).unwrap();
@@ -84,7 +83,7 @@ fn threads_and_tiles_change_nothing_in_f64() {
 }
 
 /// Tiles in which no ray can meet anything are shaded without their rays, but not where the work is counted.
-fn tiles_without_anything_are_as_others<S: Engines>() {
+fn tiles_without_anything_are_as_others<S: Shades>() {
     let mut d = scene();
     // Without the plane there is nothing around the spheres.
     d.groups[0].items.remove(0);
@@ -152,7 +151,7 @@ fn the_seed_changes_samples_but_not_single_sample_pictures() {
 
 /// Every generic engine, packets of all widths included, gives the picture of `scalar`. (`tile`, and so `auto`,
 /// computes in a frame of its own and is judged by `verify`.)
-fn engines_agree<S: Engines>() {
+fn engines_agree<S: Shades>() {
     let d = scene();
     let world = World::<S>::compile(&d, Preset::Balanced).unwrap();
     let camera = Camera::new(&framing(world.bounds(), 1.5), 1.5).unwrap();

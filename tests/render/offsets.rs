@@ -8,15 +8,14 @@ use lanecast::render::{RenderOptions, Silent, render};
 use lanecast::scene::description::{CameraDescription, Description, Group, Item, ItemKind, Projection, Shape};
 use lanecast::scene::mesh::Mesh;
 use lanecast::scene::world::{Preset, World};
-use lanecast::shade::Integrator;
-use lanecast::trace::Engines;
+use lanecast::shade::{Integrator, Shades};
 
 fn item(transform: DAffine3, kind: ItemKind) -> Item {
     Item { transform, material: None, kind }
 }
 
 /// Share of the hit pixels that are not fully open, and the number of hit pixels.
-fn leaks<S: Engines>(description: &Description, camera: Option<CameraDescription>) -> (f64, usize) {
+fn leaks<S: Shades>(description: &Description, camera: Option<CameraDescription>) -> (f64, usize) {
     let world = World::<S>::compile(description, Preset::Balanced).unwrap();
     let camera = Camera::new(&camera.unwrap_or_else(|| framing(world.bounds(), 1.0)), 1.0).unwrap();
     let options = RenderOptions {
@@ -64,7 +63,7 @@ fn ball(n: u32) -> Mesh {
     mesh
 }
 
-fn all_open<S: Engines>() {
+fn all_open<S: Shades>() {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7);
     let stretch = DMat3::from_quat(turn) * DMat3::from_diagonal(DVec3::new(3.0, 0.5, 1.0));
     let places = [
@@ -108,7 +107,7 @@ fn convex_bodies_are_open_in_f64() {
 }
 
 /// A tilted square much larger than its distance from the eye: its corners' rounding errors are what counts.
-fn large_squares_are_open<S: Engines>() {
+fn large_squares_are_open<S: Shades>() {
     for turn in 0..4 {
         let k = f64::from(turn);
         let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 0.3 + k, 1.1 - 0.3 * k, 0.1 * k - 0.7));

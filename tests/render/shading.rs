@@ -10,8 +10,7 @@ use lanecast::scene::description::{
     CameraDescription, Description, Item, ItemKind, Light, Material, Projection, Shape,
 };
 use lanecast::scene::world::{Preset, World};
-use lanecast::shade::Integrator;
-use lanecast::trace::Engines;
+use lanecast::shade::{Integrator, Shades};
 
 /// The plane z = 0 and spheres (centre, radius, material); no ambient light.
 fn scene(plane: Option<u32>, spheres: &[(DVec3, f64, u32)]) -> Description {
@@ -52,7 +51,7 @@ fn options(size: u32) -> RenderOptions {
     RenderOptions { width: size, height: size, tile: 8, engine: "scalar".into(), ..RenderOptions::default() }
 }
 
-fn picture<S: Engines>(d: &Description, camera: &Camera, options: &RenderOptions) -> RenderOutput {
+fn picture<S: Shades>(d: &Description, camera: &Camera, options: &RenderOptions) -> RenderOutput {
     let world = World::<S>::compile(d, Preset::Balanced).unwrap();
     let output = render(&world, d, camera, options, &Silent).unwrap();
     assert!(output.is_complete());
@@ -106,7 +105,7 @@ fn scenes_without_light_get_one_from_the_camera_that_goes_through_walls() {
     }
 }
 
-fn shadows<S: Engines>() {
+fn shadows<S: Shades>() {
     // A sphere of radius 1/2 floats over the origin; the light above the camera casts a round shadow on z = 0.
     let mut d = scene(Some(0), &[(DVec3::new(0.0, 0.0, 1.0), 0.5, 0)]);
     d.lights.push(Light::Directional { direction: -DVec3::Z, irradiance: DVec3::splat(PI) });

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::scene::description::{Description, Precision};
 use crate::scene::kdl::FRAME;
 use crate::scene::world::World;
-use crate::trace::Engines;
+use crate::shade::Shades;
 use crate::view::meshes::Meshes;
 
 /// Largest frame number.
@@ -74,7 +74,7 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
 
 type Frame = (RenderArgs, Description);
 
-fn all<S: Engines>(
+fn all<S: Shades>(
     first: Frame,
     rest: impl Iterator<Item = Result<Frame>>,
     options: &crate::render::RenderOptions,

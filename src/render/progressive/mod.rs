@@ -33,10 +33,9 @@ use super::tally::Tally;
 use crate::camera::{Camera, Tiling};
 use crate::error::{Error, Result, locked};
 use crate::film::Window;
-use crate::lanes::Real;
 use crate::scene::description::Description;
 use crate::scene::world::World;
-use crate::shade::{Samples, Shader, headlight};
+use crate::shade::{Samples, Shader, Shades, headlight};
 use crate::trace::Engine;
 use steps::{Lattice, check_start, plan};
 
@@ -54,7 +53,7 @@ impl Viewer for () {
 }
 
 /// A picture in the making. It can be stopped between batches at any time, looked at, and continued.
-pub struct Progressive<'a, S: Real> {
+pub struct Progressive<'a, S: Shades> {
     shader: Shader<'a, S>,
     canvas: Canvas<'a>,
     window: Window,
@@ -82,19 +81,19 @@ struct Tile {
 
 /// Arrays lent to a thread for a step. Threads come and go with each piece of work that is split off; memory that was never
 /// touched before is dear.
-struct Lent<'p, S: Real> {
+struct Lent<'p, S: Shades> {
     all: &'p Mutex<Vec<Memory<S>>>,
     memory: Memory<S>,
 }
 
-impl<'p, S: Real> Lent<'p, S> {
+impl<'p, S: Shades> Lent<'p, S> {
     fn from(all: &'p Mutex<Vec<Memory<S>>>) -> Self {
         let memory = locked(all).pop().unwrap_or_default();
         Self { all, memory }
     }
 }
 
-impl<S: Real> Drop for Lent<'_, S> {
+impl<S: Shades> Drop for Lent<'_, S> {
     fn drop(&mut self) {
         locked(self.all).push(take(&mut self.memory));
     }
@@ -108,7 +107,7 @@ struct Watch<'w> {
     total: u64,
 }
 
-impl<'a, S: Real> Progressive<'a, S> {
+impl<'a, S: Shades> Progressive<'a, S> {
     /// A picture of which nothing is traced yet, with first blocks of `start` pixels on a side (see the module for when
     /// there are none). [`RenderOptions::engine`] is not looked at.
     ///

@@ -12,7 +12,28 @@ use crate::lanes::Real;
 use crate::scene::assembly::Assembly;
 use crate::scene::description::Description;
 
-impl<S: Real> World<S> {
+/// A scalar type that worlds are compiled for. What compiles them is not generic: a program that calls it would otherwise
+/// compile the builders of trees itself, with its own settings.
+pub trait Compiles: Real {
+    #[doc(hidden)]
+    fn world(description: &Description, settings: BuildSettings, before: Option<&World<Self>>) -> Result<World<Self>>;
+}
+
+impl Compiles for f32 {
+    #[inline(never)]
+    fn world(description: &Description, settings: BuildSettings, before: Option<&World<f32>>) -> Result<World<f32>> {
+        World::new(description, settings, before)
+    }
+}
+
+impl Compiles for f64 {
+    #[inline(never)]
+    fn world(description: &Description, settings: BuildSettings, before: Option<&World<f64>>) -> Result<World<f64>> {
+        World::new(description, settings, before)
+    }
+}
+
+impl<S: Compiles> World<S> {
     /// Compiles `description` with trees as `settings` (or a [`Preset`](crate::bvh::Preset)) say, on the current rayon pool.
     ///
     /// # Errors
@@ -31,7 +52,13 @@ impl<S: Real> World<S> {
         settings: impl Into<BuildSettings>,
         before: Option<&Self>,
     ) -> Result<Self> {
-        let (start, settings) = (Instant::now(), settings.into());
+        S::world(description, settings.into(), before)
+    }
+}
+
+impl<S: Real> World<S> {
+    fn new(description: &Description, settings: BuildSettings, before: Option<&Self>) -> Result<Self> {
+        let start = Instant::now();
         let assembly = Assembly::new(description)?;
         let mut counts = Vec::with_capacity(assembly.objects.len());
         let mut objects = Vec::with_capacity(assembly.objects.len());

@@ -19,6 +19,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 pub use crate::bvh::{BuildSettings, Preset};
+pub use compile::Compiles;
 pub use facets::Met;
 pub use rounding::Rounding;
 pub use runs::Place;
