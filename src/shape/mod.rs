@@ -20,6 +20,7 @@ mod placed;
 mod planes;
 pub mod quadric;
 pub mod quartic;
+pub mod sieve;
 mod span;
 mod sphere;
 mod taper;

@@ -4,6 +4,7 @@ mod exact;
 mod normals;
 mod placement;
 mod random;
+mod sieve;
 mod triangles;
 
 use glam::{DAffine3, DVec3};

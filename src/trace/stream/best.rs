@@ -83,11 +83,17 @@ impl<S: Real> Best<S> {
         while rest != 0 {
             let slot = rest.trailing_zeros() as usize & (BLOCK - 1);
             rest &= rest - 1;
-            let ties = t[slot] == self.t[ray] && (inst, prim[slot]) < (self.inst[ray], self.prim[ray]);
-            if t[slot] < self.t[ray] || ties {
-                (self.t[ray], self.u[ray], self.v[ray]) = (t[slot], u[slot], v[slot]);
-                (self.prim[ray], self.inst[ray]) = (prim[slot], inst);
-            }
+            self.offer(ray, [t[slot], u[slot], v[slot]], prim[slot], inst);
+        }
+    }
+
+    /// Takes a hit in, unless it is farther than the best or, as far, of a greater number: see [`HitPacket::commit`].
+    #[inline(always)]
+    pub fn offer(&mut self, ray: usize, [t, u, v]: [S; 3], prim: u32, inst: u32) {
+        let ties = t == self.t[ray] && (inst, prim) < (self.inst[ray], self.prim[ray]);
+        if t < self.t[ray] || ties {
+            (self.t[ray], self.u[ray], self.v[ray]) = (t, u, v);
+            (self.prim[ray], self.inst[ray]) = (prim, inst);
         }
     }
 

@@ -9,7 +9,8 @@ use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, map3};
 use crate::ray::Packet;
 use crate::ray::slab::Interval;
 use crate::scene::world::Instance;
-use crate::shape::{Triangle, Turned, around};
+use crate::shape::sieve::{Line, gauge};
+use crate::shape::{BLOCK, Triangle, Turned, around};
 
 /// Most rays in a chunk: one bit each in a [`Set`].
 pub const RAYS: usize = 128;
@@ -44,6 +45,10 @@ pub struct Chunk<S> {
     pub t_min: [S; RAYS],
     /// See [`Packet::t_floor`].
     pub t_floor: [S; RAYS],
+    /// See [`Line::gauge`].
+    gauge: [S; RAYS],
+    /// See [`Line::t_low`].
+    t_low: [S; RAYS],
     /// Octant of each ray (with `region`).
     pub octant: [u8; RAYS],
     /// Dominant axis of each ray.
@@ -76,6 +81,8 @@ impl<S: Real> Default for Chunk<S> {
             shear: [zero; 3],
             t_min: zero,
             t_floor: zero,
+            gauge: zero,
+            t_low: zero,
             octant: [0; RAYS],
             axis: [0; RAYS],
             dominant: [0; 3],
@@ -233,6 +240,9 @@ impl<S: Real> Chunk<S> {
         let [x, y, z] = map3(product, |x| x.abs().cmp_le(most));
         self.steep |= (!(x & y & z)).any();
         self.flat |= Triangle::along_a_face(packet.dir).any();
+        gauge(packet.org, packet.dir).store(&mut self.gauge[at..]);
+        let from_start = packet.t_floor.cmp_lt(packet.t_min);
+        V::select(from_start, packet.t_min, V::splat(V::Scalar::LOWEST)).store(&mut self.t_low[at..]);
         store3(packet.shear, &mut self.shear, at);
         packet.t_floor.store(&mut self.t_floor[at..]);
         let dominant = map3(packet.dominant, V::Mask::from_bits);
@@ -252,6 +262,23 @@ impl<S: Real> Chunk<S> {
         let axis = usize::from(self.axis[ray]);
         let pick = |v: &[[S; RAYS]; 3]| [v[0][ray], v[1][ray], v[2][ray]];
         Turned { axis, org: pick(&self.around), shear: pick(&self.shear), rcp: self.rcp[axis.min(2)][ray] }
+    }
+
+    /// Two rays, each in half of the lanes; in vectors of eight or less the first. `t`: ends of the segments.
+    #[inline(always)]
+    pub fn beside<P: Lanes<Scalar = S>>(&self, t: &[S; RAYS], first: usize, second: usize) -> Line<P> {
+        let pick = |of: &[S; RAYS]| match P::N <= BLOCK {
+            true => P::splat(of[first]),
+            false => P::select(P::Mask::from_bits(0xff), P::splat(of[first]), P::splat(of[second])),
+        };
+        Line {
+            org: each(|a| pick(&self.org[a])),
+            dir: each(|a| pick(&self.dir[a])),
+            gauge: pick(&self.gauge),
+            t_min: pick(&self.t_min),
+            t_low: pick(&self.t_low),
+            t_max: pick(t),
+        }
     }
 
     /// One ray, the same in all lanes.

@@ -5,12 +5,13 @@
 //! on through the tree meanwhile, in vain if it hits something; so not many wait, and none where few rays go through an object.
 
 use super::chunk::{Chunk, RAYS, Set};
-use super::leaf;
 use super::walk::Walk;
+use super::{leaf, sift};
 use crate::bvh::Child;
-use crate::lanes::Real;
+use crate::lanes::{Lanes, Real};
 use crate::scene::world::Object;
-use crate::shape::Facts;
+use crate::shape::BLOCK;
+use crate::shape::sieve::{Sieve, beside};
 
 /// From this many rays on a block is tested at once.
 pub const FEW: u32 = 4;
@@ -61,33 +62,29 @@ impl Due {
     }
 }
 
-/// Tests all pairs that wait: first one after the other against all triangles of their blocks; then a closer look by those that may
-/// hit some, with what they need of the triangles computed once for rays of the same block that follow each other.
+/// Tests all pairs that wait, two at once where a register holds as many lanes.
 #[inline(never)]
 pub fn test<S: Real, const COUNT: bool>(object: &Object<S>, inst: u32, chunk: &Chunk<S>, walk: &mut Walk<S>) {
-    let Walk { due, best, closer, counters, .. } = walk;
-    closer.clear();
-    for pair in 0..due.len.min(ROOM) {
-        let ray = usize::from(due.ray[pair]) & (RAYS - 1);
-        let block = &object.triangles[due.block[pair] as usize];
-        closer.add(pair, chunk, best, ray, (block, due.count[pair]));
-        if COUNT {
-            leaf::count(counters, due.count[pair], 1);
-        }
+    let Walk { due, best, sifted, counters, .. } = walk;
+    sifted.clear();
+    let (len, beside_it) = (due.len.min(ROOM), usize::from(S::Children::N > BLOCK));
+    let ray = |pair: usize| usize::from(due.ray[pair]) & (RAYS - 1);
+    let block = |pair: usize| &object.triangles[due.block[pair] as usize];
+    let lanes = |pair: usize| (1u32 << due.count[pair]) - 1;
+    for pair in (0..len).step_by(1 + beside_it) {
+        let other = (pair + beside_it).min(len - 1);
+        let (first, second) = (block(pair), block(other));
+        let sieve = Sieve::<S::Children>::new(|f| beside(&first.fields[f], &second.fields[f]));
+        let rays = [ray(pair), ray(other)];
+        let sieved = sieve.test::<true>(&chunk.beside(&best.t, rays[0], rays[1]));
+        let lanes = lanes(pair) | if other > pair { lanes(other) << BLOCK } else { 0 };
+        sifted.add::<_, true>([pair, other], rays, (&sieved, lanes), best);
+    }
+    if COUNT {
+        (0..len).for_each(|pair| leaf::count(counters, due.count[pair], 1));
+    }
+    for (pair, slots) in sifted.rest() {
+        sift::doubtful::<S, true>(block(pair), inst, chunk, best, ray(pair), slots);
     }
     due.len = 0;
-    if closer.len() == 0 {
-        return;
-    }
-    let mut of = due.block[closer.of(0)];
-    let mut facts = Facts::of_block(&object.triangles[of as usize]);
-    for at in 0..closer.len() {
-        let pair = closer.of(at);
-        let (ray, number) = (usize::from(due.ray[pair]) & (RAYS - 1), due.block[pair]);
-        let block = &object.triangles[number as usize];
-        if number != of {
-            (of, facts) = (number, Facts::of_block(block));
-        }
-        closer.look::<true>(at, chunk, best, ray, (block, &facts), inst);
-    }
 }

@@ -2,8 +2,8 @@
 
 use super::best::Best;
 use super::chunk::{Chunk, RAYS, Set};
-use super::due;
 use super::walk::Walk;
+use super::{due, sift};
 use crate::bvh::Child;
 use crate::lanes::{LaneMask, Lanes, Real, map3};
 use crate::ray::{Counters, HitPacket, Packet};
@@ -32,6 +32,16 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
         vectors(chunk, walk, rays, kernel);
         return;
     }
+    if walk.sieve {
+        if ANY && !walk.at_once && rays.count_ones() < due::FEW {
+            if walk.due.add(child, rays) {
+                due::test::<V::Scalar, COUNT>(object, inst, chunk, walk);
+            }
+        } else {
+            sift::block::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk, child, rays);
+        }
+        return;
+    }
     let mut few = rays;
     if rays.count_ones() >= DENSE {
         for at in (0..chunk.len).step_by(V::N) {
@@ -49,12 +59,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
             }
         }
     }
-    // To know what it hits soon is worth more to a ray that asks for the nearest, or to many.
-    if !ANY || walk.at_once || few.count_ones() >= due::FEW {
-        sparse::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk, child, few);
-    } else if walk.due.add(child, few) {
-        due::test::<V::Scalar, COUNT>(object, inst, chunk, walk);
-    }
+    sparse::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk, child, few);
 }
 
 /// Runs a packet kernel on the vectors of a chunk that hold some of `rays`.

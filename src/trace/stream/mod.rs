@@ -7,7 +7,8 @@
 //! leaf likewise; where few any-hit rays meet one, they wait for those of other leaves ([`due`]). Vectors of rays that are
 //! coherent after all go to the packet kernel, unless triangles are known to be too fine for that ([`Job::apart`]); among
 //! shapes, blocks of such vectors go down the tree together; short any-hit rays may go unsorted ([`neighbours`]). The
-//! kernels and so the hits are those of the other generic engines, bit by bit.
+//! kernels and so the hits are those of the other generic engines, bit by bit: a sieve settles what is certain ([`sift`]). For tiles,
+//! which have an arithmetic of their own, it also says where ([`Job::plain`]).
 //!
 //! Sources: Wald, Gribble, Boulos, Kensler, "SIMD Ray Stream Tracing", 2007; Tsakok, "Faster Incoherent Rays: Multi-BVH
 //! Ray Stream Tracing", 2009; Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient ray tracing kernels for modern CPU
@@ -24,6 +25,7 @@ mod neighbours;
 mod node;
 mod patience;
 mod region;
+mod sift;
 mod signs;
 mod visitors;
 mod walk;
@@ -76,6 +78,7 @@ pub struct Memory<S> {
     best: Best<S>,
     waiting: walk::Pile<S>,
     closer: leaf::Closer<S>,
+    sifted: sift::Sifted<S>,
     block: Block<S>,
     savings: neighbours::Savings,
 }
@@ -92,6 +95,7 @@ impl<S: Real> Default for Memory<S> {
             best: Best::default(),
             waiting: walk::Pile::default(),
             closer: leaf::Closer::default(),
+            sifted: sift::Sifted::default(),
             block: Block::default(),
             savings: neighbours::Savings::default(),
         }
@@ -118,6 +122,9 @@ pub struct Job<'a, S> {
     pub output: Output<'a, S>,
     /// Rays that point the same way are known to have few triangles in common all the same: none are traced as packets.
     pub apart: bool,
+    /// Closest-hit: hits may be those of the plain test, not the common formula's, where it is certain (see [`sift`]). None are traced
+    /// as packets then: chunks are the faster.
+    pub plain: bool,
 }
 
 impl<S: Real> Job<'_, S> {
@@ -209,7 +216,12 @@ impl<S: Real> Job<'_, S> {
     #[inline(always)]
     fn alike<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
         let (packet, t_max, live) = self.load::<V, COUNT>(at);
-        if live != 0 && !self.apart && Signs::of(&packet).agree(live) && self.packet::<V, ANY, COUNT>(at, live) {
+        if live != 0
+            && !self.apart
+            && (ANY || !self.plain)
+            && Signs::of(&packet).agree(live)
+            && self.packet::<V, ANY, COUNT>(at, live)
+        {
             return 0;
         }
         self.sort(at, &packet, t_max, live)
@@ -297,7 +309,7 @@ impl<S: Real> Job<'_, S> {
     /// Traces what was sorted, chunk by chunk.
     #[inline(always)]
     fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
-        let Memory { rows, starts, bins, places, chunk, local, best, waiting, closer, .. } = &mut *self.memory;
+        let Memory { rows, starts, bins, places, chunk, local, best, waiting, closer, sifted, .. } = &mut *self.memory;
         let id = |place: u32| starts[place as usize / V::N] as usize + place as usize % V::N;
         for octant in 0..OCTANTS {
             places.clear();
@@ -309,7 +321,9 @@ impl<S: Real> Job<'_, S> {
                 rest = others;
                 chunk.gather::<V, ANY>(rows, places, &mut best.t);
                 best.start();
-                let mut walk = walk::Walk::new(best, (waiting, closer), self.stack, self.counters);
+                let room = walk::Room { waiting, closer, sifted };
+                let mut walk = walk::Walk::new(best, room, self.stack, self.counters);
+                walk.plain = self.plain;
                 walk.world::<V, ANY, COUNT>(self.world, chunk, local, octant);
                 match &mut self.output {
                     Output::Closest(hits) => best.scatter(hits, places, id),
@@ -370,12 +384,14 @@ fn call<V: Lanes, const ANY: bool>(
 {
     let super::Memory { stack, stream: memory } = V::Scalar::memory(scratch);
     stack.reserve(world.stack_bound());
-    let (starts, apart) = ((0..rays.len()).step_by(V::N), false);
+    let (starts, apart, plain) = ((0..rays.len()).step_by(V::N), false, false);
     match counters {
-        Some(counters) => Job { world, rays, memory, stack, counters, output, apart }.run::<V, ANY, true>(starts),
+        Some(counters) => {
+            Job { world, rays, memory, stack, counters, output, apart, plain }.run::<V, ANY, true>(starts)
+        }
         None => {
             let counters = &mut Counters::default();
-            Job { world, rays, memory, stack, counters, output, apart }.run::<V, ANY, false>(starts);
+            Job { world, rays, memory, stack, counters, output, apart, plain }.run::<V, ANY, false>(starts);
         }
     }
 }

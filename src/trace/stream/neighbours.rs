@@ -59,7 +59,7 @@ impl<S: Real> Job<'_, S> {
 
     /// Traces vectors of rays as they come; false if they reach too far for that.
     fn together<V: Lanes<Scalar = S>, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
-        let Memory { chunk, local, best, waiting, closer, savings, .. } = &mut *self.memory;
+        let Memory { chunk, local, best, waiting, closer, sifted, savings, .. } = &mut *self.memory;
         chunk.start(starts.len() * V::N);
         let (mut extent, mut dead) = (Extent::<V>::none(), 0);
         for (k, &at) in starts.iter().enumerate() {
@@ -82,7 +82,8 @@ impl<S: Real> Job<'_, S> {
         if COUNT {
             self.counters.rays += u64::from(rays);
         }
-        let mut walk = walk::Walk::new(best, (waiting, closer), self.stack, self.counters);
+        let room = walk::Room { waiting, closer, sifted };
+        let mut walk = walk::Walk::new(best, room, self.stack, self.counters);
         walk.world::<V, true, COUNT>(world, chunk, local, 0);
         savings.remember(walk.tests, rays);
         let done = best.done & !dead;

@@ -3,7 +3,8 @@
 use super::best::Best;
 use super::chunk::{Chunk, RAYS, Set};
 use super::leaf::Closer;
-use super::walk::{Pile, Walk};
+use super::sift::Sifted;
+use super::walk::{Pile, Room, Walk};
 use crate::lanes::{Lanes, Real};
 use crate::ray::{Counters, HitPacket, Packet};
 use crate::scene::world::Object;
@@ -19,13 +20,14 @@ pub struct Visitors<S> {
     best: Best<S>,
     waiting: Pile<S>,
     closer: Closer<S>,
+    sifted: Sifted<S>,
     rays: Set,
 }
 
 impl<S: Real> Default for Visitors<S> {
     fn default() -> Self {
-        let (waiting, closer) = (Pile::default(), Closer::default());
-        Self { chunk: Chunk::default(), best: Best::default(), waiting, closer, rays: 0 }
+        let (waiting, closer, sifted) = (Pile::default(), Closer::default(), Sifted::default());
+        Self { chunk: Chunk::default(), best: Best::default(), waiting, closer, sifted, rays: 0 }
     }
 }
 
@@ -57,9 +59,11 @@ impl<S: Real> Visitors<S> {
         stack: &mut Stack<S>,
         counters: &mut Counters,
     ) {
-        let Self { chunk, best, waiting, closer, rays } = self;
+        let Self { chunk, best, waiting, closer, sifted, rays } = self;
         chunk.len = vectors * V::N;
-        Walk::new(best, (waiting, closer), stack, counters).octants::<V, ANY, COUNT>(object, inst, chunk, *rays);
+        let mut walk = Walk::new(best, Room { waiting, closer, sifted }, stack, counters);
+        walk.plain = true;
+        walk.octants::<V, ANY, COUNT>(object, inst, chunk, *rays);
     }
 
     /// What the rays of vector `k` hit.

@@ -3,12 +3,13 @@
 use super::best::Best;
 use super::chunk::{Chunk, RAYS, Set};
 use super::due::{self, Due};
-use super::{leaf, mixed, node};
+use super::{leaf, mixed, node, sift};
 use crate::bvh::{Child, Node, Tree, WIDE, WIDTH};
 use crate::lanes::words::prefetch_either;
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Counters;
 use crate::scene::world::{Object, World};
+use crate::shape::sieve;
 use crate::trace::leaf as packet_leaf;
 use crate::trace::query::Stack;
 
@@ -60,6 +61,16 @@ impl<S: Real> Pile<S> {
     }
 }
 
+/// Working memory of a chunk's query.
+pub struct Room<'a, S> {
+    /// Boxes to visit.
+    pub waiting: &'a mut Pile<S>,
+    /// Room for the closer look at a leaf.
+    pub closer: &'a mut leaf::Closer<S>,
+    /// Room for what a leaf's sieve does not settle.
+    pub sifted: &'a mut sift::Sifted<S>,
+}
+
 /// The state of a chunk's query.
 pub struct Walk<'a, S> {
     /// What was found.
@@ -68,6 +79,8 @@ pub struct Walk<'a, S> {
     pub waiting: &'a mut Pile<S>,
     /// Room for the closer look at a leaf.
     pub closer: &'a mut leaf::Closer<S>,
+    /// Room for what a leaf's sieve does not settle.
+    pub sifted: &'a mut sift::Sifted<S>,
     /// For kernels that want one.
     pub stack: &'a mut Stack<S>,
     /// Counters.
@@ -76,6 +89,10 @@ pub struct Walk<'a, S> {
     pub due: Due,
     /// Whether none is to wait.
     pub at_once: bool,
+    /// Closest-hit: hits may be those of the plain test, not the common formula's, where it is certain (see [`sift`]).
+    pub plain: bool,
+    /// Whether triangles are tested by [`sift`]: those of this object are within the bounds of [`sieve`].
+    pub sieve: bool,
     /// Tests of nodes' boxes, of rays of any octants.
     pub tests: u64,
 }
@@ -83,13 +100,10 @@ pub struct Walk<'a, S> {
 impl<'a, S: Real> Walk<'a, S> {
     /// The beginning of a query.
     #[inline(always)]
-    pub fn new(
-        best: &'a mut Best<S>,
-        (waiting, closer): (&'a mut Pile<S>, &'a mut leaf::Closer<S>),
-        stack: &'a mut Stack<S>,
-        counters: &'a mut Counters,
-    ) -> Self {
-        Self { best, waiting, closer, stack, counters, due: Due::default(), at_once: false, tests: 0 }
+    pub fn new(best: &'a mut Best<S>, room: Room<'a, S>, stack: &'a mut Stack<S>, counters: &'a mut Counters) -> Self {
+        let Room { waiting, closer, sifted } = room;
+        let (due, at_once) = (Due::default(), false);
+        Self { best, waiting, closer, sifted, stack, counters, due, at_once, plain: false, sieve: false, tests: 0 }
     }
 
     /// Traces a chunk of one octant through the whole world. `local` is room for the chunk in an instance's space.
@@ -198,7 +212,10 @@ impl<'a, S: Real> Walk<'a, S> {
                 packet_leaf::unbounded(object, inst, packet, query, lanes);
             });
         }
-        self.at_once = rays.count_ones() < due::LEAST;
+        let most = S::from_f64(sieve::MOST);
+        let bounds = [object.tree.bounds.lo, object.tree.bounds.hi];
+        self.sieve = (ANY || self.plain) && bounds.as_flattened().iter().all(|x| Lanes::abs(*x) <= most);
+        self.at_once = !self.sieve || rays.count_ones() < due::LEAST;
         let at = |child: Child| child.index as usize;
         self.tree::<V, _, ANY, COUNT, MIXED>(
             &object.tree,

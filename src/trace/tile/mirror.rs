@@ -268,7 +268,7 @@ impl Job<'_> {
     }
 
     /// Traces what is left over.
-    pub fn leftovers<const COUNT: bool>(&mut self) {
+    pub fn leftovers<const EXACT: bool, const COUNT: bool>(&mut self) {
         let Left { ids, mut rays, mut hits } = std::mem::take(&mut self.memory.left);
         rays.open(ids.len());
         for (i, &id) in ids.iter().enumerate() {
@@ -286,6 +286,7 @@ impl Job<'_> {
             counters,
             output: Output::Closest(&mut hits),
             apart: false,
+            plain: !EXACT,
         };
         job.run::<V, false, COUNT>((0..ids.len()).step_by(V::N));
         if let Output::Closest(to) = &mut self.output {

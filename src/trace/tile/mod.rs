@@ -9,7 +9,7 @@
 //! the rays, by the stream kernel ([`fine`]); shapes in them are tested ray by ray ([`shapes`]). To the stream kernel
 //! ([`super::stream`]) go blocks of rays without a common point, tiles whose rays are farther apart than triangles ([`density`]),
 //! and worlds with solids, with more shapes than triangles, or with maps too flat for f32; for `tile-exact` also all worlds
-//! with instances. Single odd rays go to the packet kernel.
+//! with instances. There `tile` asks for answers of the plain test. Single odd rays go to the packet kernel.
 //!
 //! Sources: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm", 2005; Wald, Boulos, Shirley, "Ray tracing
 //! deformable scenes using dynamic bounding volume hierarchies", 2007; Fuetterling, Lojewski, Pfreundt, Ebert,
@@ -209,7 +209,7 @@ impl<'a> Job<'a> {
             }
             if mirrors && self.mirrored::<EXACT, COUNT>(first) {
                 if self.memory.left.len() > stream::SOURCE {
-                    self.leftovers::<COUNT>();
+                    self.leftovers::<EXACT, COUNT>();
                 }
                 continue;
             }
@@ -225,19 +225,24 @@ impl<'a> Job<'a> {
             }
         }
         if self.memory.left.len() > 0 {
-            self.leftovers::<COUNT>();
+            self.leftovers::<EXACT, COUNT>();
         }
         let rest = std::mem::take(&mut self.memory.rest);
-        self.memory.rest = self.streamed::<ANY, COUNT>(rest, false);
+        self.memory.rest = self.streamed::<ANY, EXACT, COUNT>(rest, false);
         let apart = std::mem::take(&mut self.memory.apart);
-        self.memory.apart = self.streamed::<ANY, COUNT>(apart, true);
+        self.memory.apart = self.streamed::<ANY, EXACT, COUNT>(apart, true);
     }
 
     /// Traces the groups that start at `starts` by the stream kernel; returns the list, empty. `apart`: see [`stream::Job`].
-    fn streamed<const ANY: bool, const COUNT: bool>(&mut self, mut starts: Vec<usize>, apart: bool) -> Vec<usize> {
+    fn streamed<const ANY: bool, const EXACT: bool, const COUNT: bool>(
+        &mut self,
+        mut starts: Vec<usize>,
+        apart: bool,
+    ) -> Vec<usize> {
         if !starts.is_empty() {
             let Self { world, rays, stream: memory, stack, counters, output, .. } = self;
-            let mut job = stream::Job { world, rays, memory, stack, counters, output: output.reborrow(), apart };
+            let plain = !EXACT;
+            let mut job = stream::Job { world, rays, memory, stack, counters, output: output.reborrow(), apart, plain };
             job.run::<V, ANY, COUNT>(starts.drain(..));
         }
         starts

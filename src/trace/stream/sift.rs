@@ -1,0 +1,182 @@
+//! Leaves by the sieve: rays of a chunk against a block of triangles, two at a time where a register holds as many lanes.
+//!
+//! Any-hit, what is certain is done and what is not is left to the common formula, so answers are its own. Closest-hit, tiles take
+//! what they leave to this kernel from the plain test where that is certain of the triangle: [`Walk::plain`]. Its parameter is moved
+//! into the triangle's own box, as that of the common formula is, so hits do not depend on which boxes were visited first.
+
+use super::best::Best;
+use super::chunk::{Chunk, RAYS, Set};
+use super::leaf;
+use super::walk::Walk;
+use crate::bvh::Child;
+use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real, each};
+use crate::ray::slab::Interval;
+use crate::scene::world::Object;
+use crate::shape::sieve::{Sieve, Sieved, beside};
+use crate::shape::{BLOCK, Block, Facts, Triangle};
+
+/// Rays in a vector of the sieve, at most.
+const BESIDE: usize = 2;
+
+/// Tests of a block at most, half as many rays in each half of a chunk rounded up.
+const TESTS: usize = RAYS;
+
+/// Tests that left something to do.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub struct Sifted<S> {
+    /// Way, speed and the two weights of all lanes.
+    numbers: [[[S; MAX_LANES]; 4]; TESTS],
+    /// What the caller knows the rays of each test by.
+    of: [[u8; BESIDE]; TESTS],
+    /// Lanes that may hit.
+    possible: [u16; TESTS],
+    /// Lanes that surely meet their triangle.
+    certain: [u16; TESTS],
+    len: usize,
+}
+
+impl<S: Real> Default for Sifted<S> {
+    fn default() -> Self {
+        Self {
+            numbers: [[[S::ZERO; MAX_LANES]; 4]; TESTS],
+            of: [[0; BESIDE]; TESTS],
+            possible: [0; TESTS],
+            certain: [0; TESTS],
+            len: 0,
+        }
+    }
+}
+
+impl<S: Real> Sifted<S> {
+    /// Nothing is left to do.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Adds a test of `rays`, which the caller knows as `of`, and of the triangles that are set in `lanes`. Always writes it and takes
+    /// it back if nothing is left: whether there is is a surprise every time.
+    #[inline(always)]
+    pub fn add<P: Lanes<Scalar = S>, const ANY: bool>(
+        &mut self,
+        of: [usize; BESIDE],
+        rays: [usize; BESIDE],
+        (sieved, lanes): (&Sieved<P>, u32),
+        best: &mut Best<S>,
+    ) {
+        let at = self.len & (TESTS - 1);
+        let (mut possible, certain) = (sieved.possible.bits() & lanes, sieved.certain.bits() & lanes);
+        if ANY {
+            let [first, second] = [certain & 0xff != 0, certain >> BLOCK != 0];
+            best.done |= Set::from(first) << rays[0] | Set::from(second) << rays[1];
+            possible &= if first { 0xff00 } else { 0xffff } & if second { 0xff } else { 0xffff };
+        } else {
+            let Sieved { way, speed, weights: [v, w], .. } = sieved;
+            [way, speed, v, w].into_iter().zip(&mut self.numbers[at]).for_each(|(x, to)| x.store(to));
+        }
+        (self.of[at], self.possible[at], self.certain[at]) = (of.map(|of| of as u8), possible as u16, certain as u16);
+        self.len = at + usize::from(possible != 0);
+    }
+
+    /// The rays that something is left to do for, as the caller knows them, and the triangles, as bits.
+    #[inline(always)]
+    pub fn rest(&self) -> impl Iterator<Item = (usize, u32)> {
+        (0..self.len.min(TESTS) * BESIDE).filter_map(|at| {
+            let (test, half) = (at / BESIDE, at % BESIDE);
+            let slots = u32::from(self.possible[test]) >> (BLOCK * half) & 0xff;
+            (slots != 0).then_some((self.of[test][half].into(), slots))
+        })
+    }
+}
+
+/// Tests the block a leaf refers to.
+#[inline(always)]
+pub fn block<S: Real, const ANY: bool, const COUNT: bool>(
+    object: &Object<S>,
+    inst: u32,
+    chunk: &Chunk<S>,
+    walk: &mut Walk<S>,
+    child: Child,
+    rays: Set,
+) {
+    let block = &object.triangles[child.index as usize];
+    let Walk { best, sifted, .. } = walk;
+    sifted.clear();
+    let lanes = (1u32 << child.count) - 1;
+    let sieve = Sieve::<S::Children>::new(|f| beside(&block.fields[f], &block.fields[f]));
+    for half in 0..2 {
+        let mut rest = (rays >> (64 * half)) as u64;
+        while rest != 0 {
+            let next = |rest: &mut u64| {
+                let ray = (64 * half + rest.trailing_zeros() as usize) & (RAYS - 1);
+                *rest &= rest.wrapping_sub(1);
+                ray
+            };
+            let first = next(&mut rest);
+            let two = S::Children::N > BLOCK && rest != 0;
+            let second = if two { next(&mut rest) } else { first };
+            let sieved = sieve.test::<ANY>(&chunk.beside(&best.t, first, second));
+            let lanes = if two { lanes | lanes << BLOCK } else { lanes };
+            sifted.add::<_, ANY>([first, second], [first, second], (&sieved, lanes), best);
+        }
+    }
+    if COUNT {
+        leaf::count(walk.counters, child.count, rays.count_ones());
+    }
+    if ANY {
+        for (ray, slots) in sifted.rest() {
+            doubtful::<S, ANY>(block, inst, chunk, best, ray & (RAYS - 1), slots);
+        }
+        return;
+    }
+    for test in 0..sifted.len.min(TESTS) {
+        let mut rest = u32::from(sifted.possible[test]);
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize & (MAX_LANES - 1);
+            rest &= rest - 1;
+            let (ray, slot) = (usize::from(sifted.of[test][lane / BLOCK]) & (RAYS - 1), lane % BLOCK);
+            if sifted.certain[test] >> lane & 1 == 0 {
+                doubtful::<S, ANY>(block, inst, chunk, best, ray, 1 << slot);
+                continue;
+            }
+            let [way, speed, v, w] = [0, 1, 2, 3].map(|k| sifted.numbers[test][k][lane]);
+            let inverse = S::ONE / speed;
+            let t = moved(chunk, ray, (block, slot), way * inverse);
+            if chunk.t_min[ray] <= t {
+                best.offer(ray, [t, v * inverse, w * inverse], block.prim[slot], inst);
+            }
+        }
+    }
+}
+
+/// A parameter moved into the box of a triangle, as the common formula does.
+#[inline(always)]
+fn moved<S: Real>(chunk: &Chunk<S>, ray: usize, (block, slot): (&Block<S, 9>, usize), t: S) -> S {
+    let own = Triangle::bounds(&block.get(slot));
+    let column = |of: &[[S; RAYS]; 3]| each(|a| of[a][ray]);
+    let interval = Interval::<S>::of_line(column(&chunk.org), column(&chunk.rcp), own.lo, own.hi);
+    chunk.t_floor[ray].fast_max(interval.clamp(t))
+}
+
+/// One ray against some triangles of a block, by the common formula.
+#[cold]
+#[inline(never)]
+pub fn doubtful<S: Real, const ANY: bool>(
+    block: &Block<S, 9>,
+    inst: u32,
+    chunk: &Chunk<S>,
+    best: &mut Best<S>,
+    ray: usize,
+    slots: u32,
+) {
+    let (maybe, edges) = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], best.t[ray], block);
+    let facts = Facts::of_block(block);
+    let found = Triangle::look_closer(&chunk.splat(ray), block, &facts, maybe & slots, edges, chunk.flat);
+    let wanted = (found.hit & found.t.cmp_le(S::Octo::splat(best.t[ray]))).bits();
+    if ANY {
+        best.done |= Set::from(wanted != 0) << ray;
+    } else if wanted != 0 {
+        best.take(ray, wanted, &found, &block.prim, inst);
+    }
+}
