@@ -21,7 +21,7 @@
 
 use super::block::BLOCK;
 use super::triangle::Triangle;
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, map3};
+use crate::lanes::{Lanes, Lanes3, Real, dot, each, map3};
 
 /// Bound of edge functions, in half ulps.
 const EDGES: f64 = 128.0;
