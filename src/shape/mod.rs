@@ -20,7 +20,7 @@ mod placed;
 mod planes;
 pub mod quadric;
 pub mod quartic;
-pub mod sieve;
+pub(crate) mod sieve;
 mod span;
 mod sphere;
 mod taper;

@@ -122,8 +122,10 @@ pub struct Sieved<P: Lanes> {
     /// Weights of the second and third corner, times `speed`.
     pub weights: [P; 2],
     /// What `way` may be off by.
+    #[cfg(test)]
     pub off: P,
     /// What `speed` may be off by.
+    #[cfg(test)]
     pub slant: P,
 }
 
@@ -180,6 +182,16 @@ impl<P: Lanes> Sieve<P> {
             let ahead = slant.mul_add(ray.t_min.abs(), off).cmp_lt(from_start);
             certain = certain & ahead & (endless | to_end.cmp_lt(-end_off));
         }
-        Sieved { possible, certain, way, speed, weights: [v, w], off, slant }
+        Sieved {
+            possible,
+            certain,
+            way,
+            speed,
+            weights: [v, w],
+            #[cfg(test)]
+            off,
+            #[cfg(test)]
+            slant,
+        }
     }
 }

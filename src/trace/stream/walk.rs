@@ -214,8 +214,10 @@ impl<'a, S: Real> Walk<'a, S> {
         }
         let most = S::from_f64(sieve::MOST);
         let bounds = [object.tree.bounds.lo, object.tree.bounds.hi];
-        self.sieve = (ANY || self.plain) && bounds.as_flattened().iter().all(|x| Lanes::abs(*x) <= most);
-        self.at_once = !self.sieve || rays.count_ones() < due::LEAST;
+        // Few rays are mostly alone at a leaf, where the sieve costs more than the common formula.
+        let few = rays.count_ones() < due::LEAST;
+        self.sieve = (self.plain || ANY && !few) && bounds.as_flattened().iter().all(|x| Lanes::abs(*x) <= most);
+        self.at_once = !self.sieve || few;
         let at = |child: Child| child.index as usize;
         self.tree::<V, _, ANY, COUNT, MIXED>(
             &object.tree,
