@@ -216,7 +216,8 @@ impl<'a, S: Real> Walk<'a, S> {
         let bounds = [object.tree.bounds.lo, object.tree.bounds.hi];
         // Few rays are mostly alone at a leaf, where the sieve costs more than the common formula.
         let few = rays.count_ones() < due::LEAST;
-        self.sieve = (self.plain || ANY && !few) && bounds.as_flattened().iter().all(|x| Lanes::abs(*x) <= most);
+        let wanted = if ANY { !few } else { self.plain };
+        self.sieve = wanted && bounds.as_flattened().iter().all(|x| Lanes::abs(*x) <= most);
         self.at_once = !self.sieve || few;
         let at = |child: Child| child.index as usize;
         self.tree::<V, _, ANY, COUNT, MIXED>(
