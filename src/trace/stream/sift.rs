@@ -18,7 +18,7 @@ use crate::shape::{BLOCK, Block, Facts, Triangle};
 /// Rays in a vector of the sieve, at most.
 const BESIDE: usize = 2;
 
-/// Tests of a block at most, half as many rays in each half of a chunk rounded up.
+/// Most tests of a block: one for each ray where a register holds eight lanes.
 const TESTS: usize = RAYS;
 
 /// Tests that left something to do.
