@@ -14,7 +14,8 @@ pub struct Best<S> {
     u: [S; RAYS],
     v: [S; RAYS],
     prim: [u32; RAYS],
-    inst: [u32; RAYS],
+    /// Instance numbers.
+    pub inst: [u32; RAYS],
     /// Any-hit: rays that found something.
     pub done: Set,
 }
@@ -43,11 +44,14 @@ impl<S: Real> Best<S> {
         self.inst[first..first + n].fill(INVALID_ID);
     }
 
-    /// Rays whose segments, as far as they are still looked at, reach to `near`.
+    /// Rays whose segments, as far as they are still looked at, reach to `near`; of the first `len`, others are unspecified.
     #[inline(always)]
-    pub fn reaching<V: Lanes<Scalar = S>>(&self, near: S) -> Set {
+    pub fn reaching<V: Lanes<Scalar = S>>(&self, near: S, len: usize) -> Set {
         let near = V::splat(near);
         let reach = |at: usize| Set::from(near.cmp_le(V::load(&self.t[at..])).bits()) << at;
+        if len <= V::N {
+            return reach(0);
+        }
         (0..RAYS).step_by(V::N).fold(0, |all, at| all | reach(at))
     }
 
@@ -95,6 +99,13 @@ impl<S: Real> Best<S> {
             (self.t[ray], self.u[ray], self.v[ray]) = (t, u, v);
             (self.prim[ray], self.inst[ray]) = (prim, inst);
         }
+    }
+
+    /// Puts what ray `i` of `from` has found at `to`.
+    #[inline(always)]
+    pub fn copy(&mut self, to: usize, from: &Self, i: usize) {
+        (self.t[to], self.u[to], self.v[to]) = (from.t[i], from.u[i], from.v[i]);
+        (self.prim[to], self.inst[to]) = (from.prim[i], from.inst[i]);
     }
 
     /// Writes the hits to their places in a batch.

@@ -2,13 +2,11 @@
 
 use super::bounds::Bounds;
 use super::node::DENSE;
-use super::region::{Extent, Region};
+use super::region::Region;
 use crate::lanes::rows::{ROW, Row, from_rows};
 use crate::lanes::words::transpose_bits;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, each, map3};
 use crate::ray::Packet;
-use crate::ray::slab::Interval;
-use crate::scene::world::Instance;
 use crate::shape::sieve::{Line, gauge};
 use crate::shape::{BLOCK, Triangle, Turned, around};
 
@@ -49,7 +47,7 @@ pub struct Chunk<S> {
     gauge: [S; RAYS],
     /// See [`Line::t_low`].
     t_low: [S; RAYS],
-    /// Octant of each ray (with `region`).
+    /// Octant of each ray (if `mixed`).
     pub octant: [u8; RAYS],
     /// Dominant axis of each ray.
     pub axis: [u8; RAYS],
@@ -65,7 +63,9 @@ pub struct Chunk<S> {
     pub len: usize,
     /// Bounds over all of them, if they are of one octant.
     pub bounds: Option<Bounds<S>>,
-    /// Where they all lie, if they go together whatever their octants.
+    /// Whether they go together whatever their octants.
+    pub mixed: bool,
+    /// Where they all lie, if that is known of `mixed` ones.
     pub region: Option<Region<S>>,
 }
 
@@ -91,6 +91,7 @@ impl<S: Real> Default for Chunk<S> {
             mean: [S::ZERO; 3],
             len: 0,
             bounds: None,
+            mixed: false,
             region: None,
         }
     }
@@ -130,7 +131,7 @@ impl<S: Real> Chunk<S> {
             let row = |i: usize| rows[(places[(at + i).min(last)] as usize).min(rows.len() - 1)];
             let [ox, oy, oz, t_min, dx, dy, dz, t_max] = from_rows::<V>(row);
             t_max.store(&mut t[at..]);
-            self.take(at, &Packet::new([ox, oy, oz], [dx, dy, dz], t_min));
+            self.take(at, &Packet::new([ox, oy, oz], [dx, dy, dz], t_min), V::ALL);
         }
         self.bounds = Some(Bounds::of::<V>(self, t));
         if !ANY && self.len >= DENSE as usize {
@@ -138,77 +139,20 @@ impl<S: Real> Chunk<S> {
         }
     }
 
-    /// The rays of `from` that meet an instance's box before `t`, in its space and at the same places. Returns which.
-    #[inline(always)]
-    pub fn enter<V: Lanes<Scalar = S>>(
-        &mut self,
-        from: &Self,
-        instance: &Instance<S>,
-        t: &[S; RAYS],
-        rays: Set,
-    ) -> Set {
-        self.start(from.len);
-        let together = from.region.is_some();
-        let mut inside = 0;
-        if rays.count_ones() <= FEW {
-            let (mut rest, mut extent) = (rays, Extent::none());
-            while rest != 0 {
-                let i = rest.trailing_zeros() as usize & (RAYS - 1);
-                rest &= rest - 1;
-                inside |= self.enter_vector::<S>(from, instance, t, (i, 1), &mut extent);
-            }
-            self.region = together.then(|| extent.region());
-        } else {
-            let mut extent = Extent::<V>::none();
-            for at in (0..self.len).step_by(V::N) {
-                inside |= self.enter_vector(from, instance, t, (at, (rays >> at) as u32 & V::ALL), &mut extent);
-            }
-            self.region = together.then(|| extent.region());
-        }
-        inside
-    }
-
-    #[inline(always)]
-    fn enter_vector<V: Lanes<Scalar = S>>(
-        &mut self,
-        from: &Self,
-        instance: &Instance<S>,
-        t: &[S; RAYS],
-        (at, lanes): (usize, u32),
-        extent: &mut Extent<V>,
-    ) -> Set {
-        if lanes == 0 {
-            return 0;
-        }
-        let packet = from.packet::<V>(at);
-        let interval = Interval::of(&packet, instance.bounds.lo, instance.bounds.hi);
-        let meets = interval.meets(packet.t_min, V::load(&t[at..])).bits() & lanes;
-        if meets == 0 {
-            return 0;
-        }
-        let local = packet.into_local(&instance.to_local, interval.near);
-        self.take(at, &local);
-        if from.region.is_some() {
-            self.take_octants(at, &local);
-            extent.add(local.org, local.dir, [local.t_min, V::load(&t[at..])], meets);
-        }
-        Set::from(meets) << at
-    }
-
     /// Starts anew, with `len` rays to come.
     #[inline(always)]
     pub fn start(&mut self, len: usize) {
         (self.len, self.bounds, self.region) = (len.min(RAYS), None, None);
-        (self.flat, self.steep) = (false, false);
+        (self.mixed, self.flat, self.steep) = (false, false, false);
     }
 
-    /// Takes in a vector of rays.
+    /// Takes in a vector of rays, of which those of `live` matter.
     #[inline(always)]
-    pub fn take<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>) {
+    pub fn take<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>, live: u32) {
         store3(packet.org, &mut self.org, at);
         store3(packet.dir, &mut self.dir, at);
         packet.t_min.store(&mut self.t_min[at..]);
-        self.put(at, packet);
+        self.put(at, packet, live);
     }
 
     /// Notes the octants of a vector of rays.
@@ -230,7 +174,7 @@ impl<S: Real> Chunk<S> {
 
     /// Puts in what kernels need beside origins and directions.
     #[inline(always)]
-    fn put<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>) {
+    fn put<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>, live: u32) {
         store3(packet.rcp, &mut self.rcp, at);
         let product = each(|a| packet.org[a] * packet.rcp[a]);
         let slack = map3(product, |x| x.abs() * V::constant(SLACK * V::Scalar::EPSILON.to_f64()));
@@ -238,8 +182,8 @@ impl<S: Real> Chunk<S> {
         store3(each(|a| product[a] - slack[a]), &mut self.shift[1], at);
         let most = V::constant(V::Scalar::MAX.to_f64() / 4.0);
         let [x, y, z] = map3(product, |x| x.abs().cmp_le(most));
-        self.steep |= (!(x & y & z)).any();
-        self.flat |= Triangle::along_a_face(packet.dir).any();
+        self.steep |= !(x & y & z).bits() & live != 0;
+        self.flat |= Triangle::along_a_face(packet.dir).bits() & live != 0;
         gauge(packet.org, packet.dir).store(&mut self.gauge[at..]);
         let from_start = packet.t_floor.cmp_lt(packet.t_min);
         V::select(from_start, packet.t_min, V::splat(V::Scalar::LOWEST)).store(&mut self.t_low[at..]);

@@ -1,8 +1,8 @@
 //! The rays of a chunk that go together whatever their octants, against the boxes of a node: what [`super::node`] has for those of
-//! one octant, any-hit only.
+//! one octant.
 
 use super::chunk::{Chunk, RAYS, Set};
-use super::node::{Met, dense, exact, one_by_one, planes, quick};
+use super::node::{Met, dense, exact, loosened, one_by_one, planes, quick};
 use super::region::Region;
 use crate::bvh::Node;
 use crate::lanes::{Lanes, map3};
@@ -27,9 +27,24 @@ pub fn meet<V: Lanes, E: Lanes<Scalar = V::Scalar>, const W: usize>(
     if few <= many {
         return dense::<V, W, true, true>(node, chunk, t, rays, (0, children));
     }
+    sparse::<E, W, true>(node, chunk, t, rays)
+}
+
+/// One ray after the other against all children.
+#[inline(always)]
+pub fn sparse<E: Lanes, const W: usize, const ANY: bool>(
+    node: &Node<E::Scalar, W>,
+    chunk: &Chunk<E::Scalar>,
+    t: &[E::Scalar; RAYS],
+    rays: Set,
+) -> Met<E::Scalar, W> {
     let boxes = |ray: usize| map3(planes(node, chunk.octant[ray].into()), |(near, far)| (E::load(near), E::load(far)));
-    match chunk.steep {
-        true => one_by_one::<E, W, true>(rays, |ray| exact(&boxes(ray), chunk, t, ray)),
-        false => one_by_one::<E, W, true>(rays, |ray| quick(&boxes(ray), chunk, t, ray)),
+    if chunk.steep {
+        return one_by_one::<E, W, ANY>(rays, |ray| exact(&boxes(ray), chunk, t, ray));
     }
+    let mut met = one_by_one::<E, W, ANY>(rays, |ray| quick(&boxes(ray), chunk, t, ray));
+    if !ANY {
+        loosened(E::load(&met.near)).store(&mut met.near);
+    }
+    met
 }

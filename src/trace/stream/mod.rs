@@ -19,6 +19,7 @@ mod block;
 mod bounds;
 mod chunk;
 mod due;
+mod inside;
 mod leaf;
 mod mixed;
 mod neighbours;
@@ -43,6 +44,7 @@ use crate::scene::world::World;
 use best::Best;
 use block::Block;
 use chunk::{Chunk, RAYS};
+use inside::Inside;
 use signs::Signs;
 pub use visitors::{MOST, Visitors};
 
@@ -73,8 +75,8 @@ pub struct Memory<S> {
     /// Those of one octant, along x, then y, then z.
     places: Vec<u32>,
     chunk: Chunk<S>,
-    /// The chunk in an instance's space.
-    local: Chunk<S>,
+    /// Rays of the chunk in an instance's space.
+    inside: Inside<S>,
     best: Best<S>,
     waiting: walk::Pile<S>,
     closer: leaf::Closer<S>,
@@ -91,7 +93,7 @@ impl<S: Real> Default for Memory<S> {
             bins: Default::default(),
             places: Vec::new(),
             chunk: Chunk::default(),
-            local: Chunk::default(),
+            inside: Inside::default(),
             best: Best::default(),
             waiting: walk::Pile::default(),
             closer: leaf::Closer::default(),
@@ -309,7 +311,7 @@ impl<S: Real> Job<'_, S> {
     /// Traces what was sorted, chunk by chunk.
     #[inline(always)]
     fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
-        let Memory { rows, starts, bins, places, chunk, local, best, waiting, closer, sifted, .. } = &mut *self.memory;
+        let Memory { rows, starts, bins, places, chunk, inside, best, waiting, closer, sifted, .. } = &mut *self.memory;
         let id = |place: u32| starts[place as usize / V::N] as usize + place as usize % V::N;
         for octant in 0..OCTANTS {
             places.clear();
@@ -324,7 +326,7 @@ impl<S: Real> Job<'_, S> {
                 let room = walk::Room { waiting, closer, sifted };
                 let mut walk = walk::Walk::new(best, room, self.stack, self.counters);
                 walk.plain = self.plain;
-                walk.world::<V, ANY, COUNT>(self.world, chunk, local, octant);
+                walk.world::<V, ANY, COUNT>(self.world, chunk, inside, octant);
                 match &mut self.output {
                     Output::Closest(hits) => best.scatter(hits, places, id),
                     Output::Any(out) => best.scatter_done(out, places, id),

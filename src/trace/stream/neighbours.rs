@@ -59,13 +59,13 @@ impl<S: Real> Job<'_, S> {
 
     /// Traces vectors of rays as they come; false if they reach too far for that.
     fn together<V: Lanes<Scalar = S>, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
-        let Memory { chunk, local, best, waiting, closer, sifted, savings, .. } = &mut *self.memory;
+        let Memory { chunk, inside, best, waiting, closer, sifted, savings, .. } = &mut *self.memory;
         chunk.start(starts.len() * V::N);
         let (mut extent, mut dead) = (Extent::<V>::none(), 0);
         for (k, &at) in starts.iter().enumerate() {
             let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
             t_max.store(&mut best.t[k * V::N..]);
-            chunk.take(k * V::N, &packet);
+            chunk.take(k * V::N, &packet, V::ALL);
             chunk.take_octants(k * V::N, &packet);
             extent.add(packet.org, packet.dir, [packet.t_min, t_max], live);
             dead |= u128::from(!live & V::ALL) << (k * V::N);
@@ -76,7 +76,7 @@ impl<S: Real> Job<'_, S> {
             savings.patience.remember(false);
             return false;
         }
-        chunk.region = Some(region);
+        (chunk.mixed, chunk.region) = (true, Some(region));
         best.done = dead;
         let rays = chunk.len as u32 - dead.count_ones();
         if COUNT {
@@ -84,7 +84,7 @@ impl<S: Real> Job<'_, S> {
         }
         let room = walk::Room { waiting, closer, sifted };
         let mut walk = walk::Walk::new(best, room, self.stack, self.counters);
-        walk.world::<V, true, COUNT>(world, chunk, local, 0);
+        walk.world::<V, true, COUNT>(world, chunk, inside, 0);
         savings.remember(walk.tests, rays);
         let done = best.done & !dead;
         for (k, &at) in starts.iter().enumerate() {

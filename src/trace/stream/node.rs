@@ -79,10 +79,32 @@ fn sparse<E: Lanes, const W: usize, const ANY: bool>(
     }
     let mut met = one_by_one::<E, W, ANY>(rays, |ray| quick(&planes, chunk, t, ray));
     if !ANY {
-        let near = E::load(&met.near);
-        (near - near.abs() * E::constant(WIDER * E::Scalar::EPSILON.to_f64())).store(&mut met.near);
+        loosened(E::load(&met.near)).store(&mut met.near);
     }
     met
+}
+
+/// Where [`quick`] enters boxes, moved to where [`exact`] may.
+#[inline(always)]
+pub fn loosened<E: Lanes>(near: E) -> E {
+    near - near.abs() * E::constant(WIDER * E::Scalar::EPSILON.to_f64())
+}
+
+/// One ray of a chunk, of `octant`, against all children: which it meets, as bits, and where it enters them.
+#[inline(always)]
+pub fn alone<E: Lanes, const W: usize>(
+    node: &Node<E::Scalar, W>,
+    chunk: &Chunk<E::Scalar>,
+    t: &[E::Scalar; RAYS],
+    ray: usize,
+    octant: usize,
+) -> (u32, E) {
+    let planes = map3(planes(node, octant), |(near, far)| (E::load(near), E::load(far)));
+    let (meets, near) = match chunk.steep {
+        true => exact(&planes, chunk, t, ray),
+        false => quick(&planes, chunk, t, ray),
+    };
+    (meets.bits(), loosened(near))
 }
 
 /// `test(i)`: which children ray `i` meets, and where it enters them.

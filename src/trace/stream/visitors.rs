@@ -46,7 +46,7 @@ impl<S: Real> Visitors<S> {
             self.best.done = 0;
         }
         self.best.clear(k * V::N, V::N);
-        self.chunk.take(k * V::N, packet);
+        self.chunk.take(k * V::N, packet, V::ALL);
         t_max.store(&mut self.best.t[k * V::N..]);
         self.rays |= Set::from(lanes) << (k * V::N);
     }

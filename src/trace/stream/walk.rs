@@ -3,6 +3,7 @@
 use super::best::Best;
 use super::chunk::{Chunk, RAYS, Set};
 use super::due::{self, Due};
+use super::inside::Inside;
 use super::{leaf, mixed, node, sift};
 use crate::bvh::{Child, Node, Tree, WIDE, WIDTH};
 use crate::lanes::words::prefetch_either;
@@ -106,12 +107,12 @@ impl<'a, S: Real> Walk<'a, S> {
         Self { best, waiting, closer, sifted, stack, counters, due, at_once, plain: false, sieve: false, tests: 0 }
     }
 
-    /// Traces a chunk of one octant through the whole world. `local` is room for the chunk in an instance's space.
+    /// Traces a chunk of one octant, or a mixed one, through the whole world. `inside` is room for rays in an instance's space.
     pub fn world<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
         &mut self,
         world: &World<S>,
         chunk: &Chunk<S>,
-        local: &mut Chunk<S>,
+        inside: &mut Inside<S>,
         octant: usize,
     ) {
         let all = Set::MAX >> (RAYS - chunk.len) & if ANY { !self.best.done } else { Set::MAX };
@@ -122,21 +123,21 @@ impl<'a, S: Real> Walk<'a, S> {
         }
         let leaf = |walk: &mut Self, leaf: Child, rays: Set| {
             let inst = world.top_leaves[leaf.index as usize];
-            walk.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, rays);
+            walk.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), inside, rays);
         };
         let at = |child: Child| {
             let (at, is_leaf) = (child.index as usize, child.is_leaf());
             let inst = world.top_leaves[if is_leaf { at } else { 0 }] as usize;
             if is_leaf { inst } else { at }
         };
-        match ANY && chunk.region.is_some() {
+        match chunk.mixed {
             true => self.tree::<V, _, ANY, COUNT, true>(&world.top, chunk, (all, octant), (&world.instances, at), leaf),
             false => {
                 self.tree::<V, _, ANY, COUNT, false>(&world.top, chunk, (all, octant), (&world.instances, at), leaf)
             }
         }
         for &inst in &world.unbounded_instances {
-            self.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), local, all);
+            self.instance::<V, ANY, COUNT>(world, inst, (chunk, octant), inside, all);
         }
     }
 
@@ -146,7 +147,7 @@ impl<'a, S: Real> Walk<'a, S> {
         world: &World<S>,
         inst: u32,
         (chunk, octant): (&Chunk<S>, usize),
-        local: &mut Chunk<S>,
+        inside: &mut Inside<S>,
         rays: Set,
     ) {
         let instance = &world.instances[inst as usize];
@@ -155,8 +156,16 @@ impl<'a, S: Real> Walk<'a, S> {
             self.object::<V, ANY, COUNT>(object, inst, chunk, rays, octant);
             return;
         }
-        let inside = local.enter::<V>(chunk, instance, &self.best.t, rays);
-        self.octants::<V, ANY, COUNT>(object, inst, local, inside);
+        let rays = inside.enter::<V>((chunk, self.best), instance, rays);
+        if rays == 0 {
+            return;
+        }
+        let Self { waiting, closer, sifted, stack, counters, .. } = self;
+        let mut walk = Walk::new(&mut inside.best, Room { waiting, closer, sifted }, stack, counters);
+        walk.plain = self.plain;
+        walk.octants::<V, ANY, COUNT>(object, inst, &inside.chunk, rays);
+        self.tests += walk.tests;
+        inside.leave::<ANY>(self.best, inst);
     }
 
     /// Takes some rays of any octants through an object, in its space.
@@ -167,7 +176,7 @@ impl<'a, S: Real> Walk<'a, S> {
         local: &Chunk<S>,
         rays: Set,
     ) {
-        if local.region.is_some() {
+        if local.mixed {
             if rays != 0 {
                 self.object::<V, ANY, COUNT>(object, inst, local, rays, 0);
             }
@@ -181,7 +190,7 @@ impl<'a, S: Real> Walk<'a, S> {
         }
     }
 
-    /// Takes rays of one octant, or of any if the chunk has a region, through an object.
+    /// Takes rays of one octant, or of any if the chunk is mixed, through an object.
     #[inline(always)]
     fn object<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
         &mut self,
@@ -191,7 +200,7 @@ impl<'a, S: Real> Walk<'a, S> {
         rays: Set,
         octant: usize,
     ) {
-        match ANY && chunk.region.is_some() {
+        match chunk.mixed {
             true => self.within::<V, ANY, COUNT, true>(object, inst, chunk, rays, octant),
             false => self.within::<V, ANY, COUNT, false>(object, inst, chunk, rays, octant),
         }
@@ -290,13 +299,26 @@ impl<'a, S: Real> Walk<'a, S> {
                     self.counters.node_lanes_total += RAYS as u64;
                 }
                 let t = &self.best.t;
-                let met = match &chunk.region {
-                    Some(region) if MIXED => mixed::meet::<V, E, W>(node, chunk, region, t, rays, &mut self.tests),
-                    _ => node::meet::<V, E, W, ANY>(node, chunk, t, rays, octant),
-                };
-                if met.children != 0 {
-                    (child, rays) = self.choose::<E, W, ANY>(node, &met, &fetch);
-                    continue;
+                if rays & (rays - 1) == 0 {
+                    let ray = rays.trailing_zeros() as usize & (RAYS - 1);
+                    let octant = if MIXED { chunk.octant[ray].into() } else { octant };
+                    let (children, near) = node::alone::<E, W>(node, chunk, t, ray, octant);
+                    if children != 0 {
+                        child = self.choose_alone::<E, W, ANY>(node, (children, near), rays, &fetch);
+                        continue;
+                    }
+                } else {
+                    let met = match &chunk.region {
+                        Some(region) if MIXED && ANY => {
+                            mixed::meet::<V, E, W>(node, chunk, region, t, rays, &mut self.tests)
+                        }
+                        None if MIXED => mixed::sparse::<E, W, ANY>(node, chunk, t, rays),
+                        _ => node::meet::<V, E, W, ANY>(node, chunk, t, rays, octant),
+                    };
+                    if met.children != 0 {
+                        (child, rays) = self.choose::<E, W, ANY>(node, &met, &fetch);
+                        continue;
+                    }
                 }
             } else if rays != 0 {
                 leaf(self, child, rays);
@@ -304,7 +326,7 @@ impl<'a, S: Real> Walk<'a, S> {
             let Some(next) = self.waiting.pop(base) else { return };
             (child, rays) = (next.child, next.rays);
             if !ANY && next.bound {
-                rays &= self.best.reaching::<V>(next.near);
+                rays &= self.best.reaching::<V>(next.near, chunk.len);
             }
         }
     }
@@ -352,5 +374,56 @@ impl<'a, S: Real> Walk<'a, S> {
         }
         self.waiting.len += last;
         (node.child(next), met.rays(next))
+    }
+    /// The same for a ray that is alone.
+    #[inline(always)]
+    fn choose_alone<E: Lanes<Scalar = S>, const W: usize, const ANY: bool>(
+        &mut self,
+        node: &Node<S, W>,
+        (children, near): (u32, E),
+        rays: Set,
+        fetch: &impl Fn(Child),
+    ) -> Child {
+        let mut rest = children & (children - 1);
+        if rest == 0 {
+            let child = node.child(children.trailing_zeros() as usize & (W - 1));
+            fetch(child);
+            return child;
+        }
+        let last = rest.count_ones() as usize;
+        let places = &mut self.waiting.room()[..W];
+        if ANY {
+            rest = children;
+            for place in places.iter_mut().take(last) {
+                let slot = rest.ilog2() as usize & (W - 1);
+                rest &= !(1 << slot);
+                let child = node.child(slot);
+                fetch(child);
+                *place = Waiting { rays, near: S::ZERO, bound: false, child };
+            }
+            self.waiting.len += last;
+            let child = node.child(rest.trailing_zeros() as usize & (W - 1));
+            fetch(child);
+            return child;
+        }
+        let mut nears = [S::ZERO; W];
+        near.store(&mut nears);
+        rest = children;
+        let near = near.fast_max(E::splat(S::LOWEST));
+        let mut next = 0;
+        while rest != 0 {
+            let slot = rest.trailing_zeros() as usize & (W - 1);
+            rest &= rest - 1;
+            let child = node.child(slot);
+            fetch(child);
+            let before = (1 << slot) - 1;
+            let own = E::splat(nears[slot]).fast_max(E::splat(S::LOWEST));
+            let farther = own.cmp_lt(near).bits() & !before | own.cmp_le(near).bits() & before;
+            let place = (farther & children).count_ones() as usize & (W - 1);
+            next = if place == last { slot } else { next };
+            places[place] = Waiting { rays, near: nears[slot], bound: true, child };
+        }
+        self.waiting.len += last;
+        node.child(next)
     }
 }
