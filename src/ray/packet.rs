@@ -40,6 +40,15 @@ impl<V: Lanes> Packet<V> {
         }
     }
 
+    /// With or without what only triangles ask for: see [`Packet::new`] and [`Packet::unsheared`].
+    #[inline(always)]
+    pub fn prepared(org: Lanes3<V>, dir: Lanes3<V>, t_min: V, sheared: bool) -> Self {
+        match sheared {
+            true => Self::new(org, dir, t_min),
+            false => Self::unsheared(org, dir, t_min),
+        }
+    }
+
     /// The same without what only triangles ask for: no dominant axes, no shear.
     #[inline(always)]
     pub fn unsheared(org: Lanes3<V>, dir: Lanes3<V>, t_min: V) -> Self {
@@ -111,7 +120,14 @@ impl<V: Lanes> Packet<V> {
     /// The same rays in an instance's space; `floor` is where they enter the instance's box.
     #[inline(always)]
     pub fn into_local(&self, to_local: &Affine<V::Scalar>, floor: V) -> Self {
-        let mut local = Self::new(to_local.points(self.org), to_local.vectors(self.dir), self.t_min);
+        self.brought_in(to_local, floor, true)
+    }
+
+    /// [`Packet::into_local`] with or without what only triangles ask for.
+    #[inline(always)]
+    pub fn brought_in(&self, to_local: &Affine<V::Scalar>, floor: V, sheared: bool) -> Self {
+        let (org, dir) = (to_local.points(self.org), to_local.vectors(self.dir));
+        let mut local = Self::prepared(org, dir, self.t_min, sheared);
         local.t_floor = floor;
         local
     }

@@ -22,6 +22,7 @@
 use super::block::BLOCK;
 use super::triangle::Triangle;
 use crate::lanes::{Lanes, Lanes3, Real, dot, each, map3};
+use crate::math::Aabb;
 
 /// Bound of edge functions, in half ulps.
 const EDGES: f64 = 128.0;
@@ -37,6 +38,12 @@ const STEEP: f64 = 64.0;
 
 /// Largest coordinates of rays and triangles that the bounds hold for; no object may have triangles beyond it.
 pub const MOST: f64 = (1 << 24) as f64;
+
+/// Whether the bounds hold for triangles in a box.
+pub fn holds_within<S: Real>(bounds: &Aabb<S>) -> bool {
+    let most = S::from_f64(MOST);
+    [bounds.lo, bounds.hi].as_flattened().iter().all(|x| Lanes::abs(*x) <= most)
+}
 
 /// More than is lost below the smallest number: a product of three numbers up to some [`MOST`], one of them lost, times the terms.
 fn tiny<S: Real>() -> f64 {

@@ -80,6 +80,7 @@ impl<S: Real> World<S> {
             triangles: a.triangles || b.triangles,
             shapes: a.shapes || b.shapes,
             others: a.others || b.others,
+            large: a.large || b.large,
             sorting: a.sorting || b.sorting,
         });
         let build_seconds = start.elapsed().as_secs_f64();

@@ -33,7 +33,7 @@ use crate::bvh::Tree;
 use crate::csg;
 use crate::lanes::Real;
 use crate::math::{Aabb, Affine};
-use crate::shape::{Block, Placed, Triangle, WorldSphere};
+use crate::shape::{Block, Placed, Triangle, WorldSphere, sieve};
 
 /// Leaf classes of object trees: what a block holds. [`Class::ALL`]`[i] as u8 == i`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,8 +151,17 @@ pub struct Kinds {
     pub shapes: bool,
     /// Half-spaces or trees of solids.
     pub others: bool,
+    /// Triangles with coordinates beyond the bounds of [`crate::shape::sieve`].
+    pub large: bool,
     /// What repays sorting rays that part: solids of many leaves, or a tree that is large for narrow lanes.
     pub sorting: bool,
+}
+
+impl Kinds {
+    /// Whether something asks for a packet's shear where meshes are tested by [`crate::shape::sieve`].
+    pub fn ask_for_shear(&self) -> bool {
+        self.large || self.others
+    }
 }
 
 /// Leaves of solids, on average, from which on sorted rays are traced faster (results/NOTES.md).
@@ -352,6 +361,7 @@ impl<S: Real> Object<S> {
             triangles: !self.triangles.is_empty() || self.solids.iter().any(|s| s.solid.has_meshes()),
             shapes,
             others: !self.unbounded.is_empty() || !self.solids.is_empty(),
+            large: !self.triangles.is_empty() && !sieve::holds_within(&self.tree.bounds),
             sorting: is_large || leaves > MANY_LEAVES * self.solids.len(),
         }
     }

@@ -63,6 +63,8 @@ pub struct Chunk<S> {
     pub len: usize,
     /// Bounds over all of them, if they are of one octant.
     pub bounds: Option<Bounds<S>>,
+    /// Whether there is what the common formula needs beside: `around`, `shear`, `axis` and `dominant`.
+    pub sheared: bool,
     /// Whether they go together whatever their octants.
     pub mixed: bool,
     /// Where they all lie, if that is known of `mixed` ones.
@@ -91,6 +93,7 @@ impl<S: Real> Default for Chunk<S> {
             mean: [S::ZERO; 3],
             len: 0,
             bounds: None,
+            sheared: true,
             mixed: false,
             region: None,
         }
@@ -123,15 +126,16 @@ impl<S: Real> Chunk<S> {
         rows: &[Row<S>],
         places: &[u32],
         t: &mut [S; RAYS],
+        sheared: bool,
     ) {
-        self.start(places.len());
+        self.start(places.len(), sheared);
         let last = self.len - 1;
         for at in (0..self.len).step_by(V::N) {
             // Whole vectors: the last ray again.
             let row = |i: usize| rows[(places[(at + i).min(last)] as usize).min(rows.len() - 1)];
             let [ox, oy, oz, t_min, dx, dy, dz, t_max] = from_rows::<V>(row);
             t_max.store(&mut t[at..]);
-            self.take(at, &Packet::new([ox, oy, oz], [dx, dy, dz], t_min), V::ALL);
+            self.take(at, &Packet::prepared([ox, oy, oz], [dx, dy, dz], t_min, sheared), V::ALL);
         }
         self.bounds = Some(Bounds::of::<V>(self, t));
         if !ANY && self.len >= DENSE as usize {
@@ -139,10 +143,11 @@ impl<S: Real> Chunk<S> {
         }
     }
 
-    /// Starts anew, with `len` rays to come.
+    /// Starts anew, with `len` rays to come, with or without what the common formula needs of them beside.
     #[inline(always)]
-    pub fn start(&mut self, len: usize) {
+    pub fn start(&mut self, len: usize, sheared: bool) {
         (self.len, self.bounds, self.region) = (len.min(RAYS), None, None);
+        self.sheared = sheared;
         (self.mixed, self.flat, self.steep) = (false, false, false);
     }
 
@@ -187,8 +192,11 @@ impl<S: Real> Chunk<S> {
         gauge(packet.org, packet.dir).store(&mut self.gauge[at..]);
         let from_start = packet.t_floor.cmp_lt(packet.t_min);
         V::select(from_start, packet.t_min, V::splat(V::Scalar::LOWEST)).store(&mut self.t_low[at..]);
-        store3(packet.shear, &mut self.shear, at);
         packet.t_floor.store(&mut self.t_floor[at..]);
+        if !self.sheared {
+            return;
+        }
+        store3(packet.shear, &mut self.shear, at);
         let dominant = map3(packet.dominant, V::Mask::from_bits);
         let turned = each(|axis| around(packet.org, axis));
         let pick = |i: usize| V::select(dominant[0], turned[0][i], V::select(dominant[1], turned[1][i], turned[2][i]));
@@ -206,6 +214,28 @@ impl<S: Real> Chunk<S> {
         let axis = usize::from(self.axis[ray]);
         let pick = |v: &[[S; RAYS]; 3]| [v[0][ray], v[1][ray], v[2][ray]];
         Turned { axis, org: pick(&self.around), shear: pick(&self.shear), rcp: self.rcp[axis.min(2)][ray] }
+    }
+
+    /// One ray as the common formula takes it, `sheared` or not.
+    #[inline(always)]
+    pub fn whole(&self, ray: usize) -> (Turned<S>, Packet<S::Octo>) {
+        if self.sheared {
+            return (self.turned(ray), self.splat(ray));
+        }
+        let [org, dir] = [&self.org, &self.dir].map(|v| each(|a| v[a][ray]));
+        let one = Packet { t_floor: self.t_floor[ray], ..Packet::<S>::new(org, dir, self.t_min[ray]) };
+        let axis = usize::from(one.dominant[1] != 0) + 2 * usize::from(one.dominant[2] != 0);
+        let splat3 = |v: Lanes3<S>| map3(v, S::Octo::splat);
+        let packet = Packet {
+            org: splat3(org),
+            dir: splat3(dir),
+            rcp: splat3(one.rcp),
+            t_min: S::Octo::splat(one.t_min),
+            t_floor: S::Octo::splat(one.t_floor),
+            dominant: one.dominant.map(|bits| if bits != 0 { S::Octo::ALL } else { 0 }),
+            shear: splat3(one.shear),
+        };
+        (Turned::of(&one, axis), packet)
     }
 
     /// Two rays, each in half of the lanes; in vectors of eight or less the first. `t`: ends of the segments.

@@ -2,7 +2,7 @@
 //!
 //! Most leaves are met by one ray of a chunk or two, and whether these hit something is a surprise every time. Rays of several
 //! leaves together are one loop, whose parts do not wait for each other, and the blocks have come from memory by then. A ray goes
-//! on through the tree meanwhile, in vain if it hits something; so not many wait, and none where few rays go through an object.
+//! on through the tree meanwhile, in vain if it hits something; so not many wait.
 
 use super::chunk::{Chunk, RAYS, Set};
 use super::walk::Walk;
@@ -15,9 +15,6 @@ use crate::shape::sieve::{Sieve, beside};
 
 /// From this many rays on a block is tested at once.
 pub const FEW: u32 = 4;
-
-/// From this many rays of an object on some may wait.
-pub const LEAST: u32 = 16;
 
 /// Pairs of a ray and a block that are tested together.
 const TOGETHER: usize = 32;

@@ -37,12 +37,9 @@ impl<S: Real> Inside<S> {
         rays: Set,
     ) -> Set {
         let many = rays.count_ones() as usize;
-        self.chunk.start(many);
+        self.chunk.start(many, from.sheared);
         self.chunk.mixed = from.mixed || many <= MIXED;
         self.copy((from, best), rays);
-        if many == 1 {
-            return self.enter_vectors::<S>(from, instance);
-        }
         match many <= <S::Octo as Lanes>::N {
             true => self.enter_vectors::<S::Octo>(from, instance),
             false => self.enter_vectors::<V>(from, instance),
@@ -81,7 +78,7 @@ impl<S: Real> Inside<S> {
             let (packet, t) = (self.chunk.packet::<V>(at), V::load(&self.best.t[at..]));
             let interval = Interval::of(&packet, instance.bounds.lo, instance.bounds.hi);
             let meets = interval.meets(packet.t_min, t).bits() & lanes;
-            let local: Packet<V> = packet.into_local(&instance.to_local, interval.near);
+            let local: Packet<V> = packet.brought_in(&instance.to_local, interval.near, from.sheared);
             self.chunk.take(at, &local, meets);
             if self.chunk.mixed {
                 self.chunk.take_octants(at, &local);

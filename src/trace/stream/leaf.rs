@@ -33,7 +33,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
         return;
     }
     if walk.sieve {
-        if ANY && !walk.at_once && rays.count_ones() < due::FEW {
+        if ANY && rays.count_ones() < due::FEW {
             if walk.due.add(child, rays) {
                 due::test::<V::Scalar, COUNT>(object, inst, chunk, walk);
             }

@@ -311,6 +311,8 @@ impl<S: Real> Job<'_, S> {
     /// Traces what was sorted, chunk by chunk.
     #[inline(always)]
     fn sorted<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self) {
+        let sieve = (ANY || self.plain) && !self.world.kinds.large;
+        let sheared = !sieve || self.world.kinds.ask_for_shear();
         let Memory { rows, starts, bins, places, chunk, inside, best, waiting, closer, sifted, .. } = &mut *self.memory;
         let id = |place: u32| starts[place as usize / V::N] as usize + place as usize % V::N;
         for octant in 0..OCTANTS {
@@ -321,11 +323,10 @@ impl<S: Real> Job<'_, S> {
                 // Chunks of nearly equal sizes.
                 let (places, others) = rest.split_at(rest.len().div_ceil(rest.len().div_ceil(RAYS)));
                 rest = others;
-                chunk.gather::<V, ANY>(rows, places, &mut best.t);
+                chunk.gather::<V, ANY>(rows, places, &mut best.t, sheared);
                 best.start();
                 let room = walk::Room { waiting, closer, sifted };
-                let mut walk = walk::Walk::new(best, room, self.stack, self.counters);
-                walk.plain = self.plain;
+                let mut walk = walk::Walk::new(best, room, self.stack, self.counters, sieve);
                 walk.world::<V, ANY, COUNT>(self.world, chunk, inside, octant);
                 match &mut self.output {
                     Output::Closest(hits) => best.scatter(hits, places, id),

@@ -60,10 +60,12 @@ impl<S: Real> Job<'_, S> {
     /// Traces vectors of rays as they come; false if they reach too far for that.
     fn together<V: Lanes<Scalar = S>, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
         let Memory { chunk, inside, best, waiting, closer, sifted, savings, .. } = &mut *self.memory;
-        chunk.start(starts.len() * V::N);
+        let sheared = self.world.kinds.ask_for_shear();
+        chunk.start(starts.len() * V::N, sheared);
         let (mut extent, mut dead) = (Extent::<V>::none(), 0);
         for (k, &at) in starts.iter().enumerate() {
-            let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
+            let ([org, dir], [t_min, t_max], live) = Packet::<V>::read(self.rays, at);
+            let packet = Packet::prepared(org, dir, t_min, sheared);
             t_max.store(&mut best.t[k * V::N..]);
             chunk.take(k * V::N, &packet, V::ALL);
             chunk.take_octants(k * V::N, &packet);
@@ -83,7 +85,7 @@ impl<S: Real> Job<'_, S> {
             self.counters.rays += u64::from(rays);
         }
         let room = walk::Room { waiting, closer, sifted };
-        let mut walk = walk::Walk::new(best, room, self.stack, self.counters);
+        let mut walk = walk::Walk::new(best, room, self.stack, self.counters, !world.kinds.large);
         walk.world::<V, true, COUNT>(world, chunk, inside, 0);
         savings.remember(walk.tests, rays);
         let done = best.done & !dead;

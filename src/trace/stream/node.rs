@@ -90,23 +90,6 @@ pub fn loosened<E: Lanes>(near: E) -> E {
     near - near.abs() * E::constant(WIDER * E::Scalar::EPSILON.to_f64())
 }
 
-/// One ray of a chunk, of `octant`, against all children: which it meets, as bits, and where it enters them.
-#[inline(always)]
-pub fn alone<E: Lanes, const W: usize>(
-    node: &Node<E::Scalar, W>,
-    chunk: &Chunk<E::Scalar>,
-    t: &[E::Scalar; RAYS],
-    ray: usize,
-    octant: usize,
-) -> (u32, E) {
-    let planes = map3(planes(node, octant), |(near, far)| (E::load(near), E::load(far)));
-    let (meets, near) = match chunk.steep {
-        true => exact(&planes, chunk, t, ray),
-        false => quick(&planes, chunk, t, ray),
-    };
-    (meets.bits(), loosened(near))
-}
-
 /// `test(i)`: which children ray `i` meets, and where it enters them.
 #[inline(always)]
 pub fn one_by_one<E: Lanes, const W: usize, const ANY: bool>(
@@ -265,7 +248,7 @@ mod tests {
                 to_rows(row(&packet, t_max), &mut rows[at..]);
             }
             let (mut chunk, mut t) = (Chunk::default(), [V::Scalar::ZERO; RAYS]);
-            chunk.gather::<V, false>(&rows, &places, &mut t);
+            chunk.gather::<V, false>(&rows, &places, &mut t, false);
             steep += u32::from(chunk.steep);
             // A direction of zero points up, whatever the octant.
             let (mut rest, mut of_octant) = (Set::MAX, 0);

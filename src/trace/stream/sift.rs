@@ -170,9 +170,10 @@ pub fn doubtful<S: Real, const ANY: bool>(
     ray: usize,
     slots: u32,
 ) {
-    let (maybe, edges) = Triangle::candidates(&chunk.turned(ray), chunk.t_min[ray], best.t[ray], block);
+    let (turned, packet) = chunk.whole(ray);
+    let (maybe, edges) = Triangle::candidates(&turned, chunk.t_min[ray], best.t[ray], block);
     let facts = Facts::of_block(block);
-    let found = Triangle::look_closer(&chunk.splat(ray), block, &facts, maybe & slots, edges, chunk.flat);
+    let found = Triangle::look_closer(&packet, block, &facts, maybe & slots, edges, chunk.flat);
     let wanted = (found.hit & found.t.cmp_le(S::Octo::splat(best.t[ray]))).bits();
     if ANY {
         best.done |= Set::from(wanted != 0) << ray;

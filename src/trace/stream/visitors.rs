@@ -7,7 +7,7 @@ use super::sift::Sifted;
 use super::walk::{Pile, Room, Walk};
 use crate::lanes::{Lanes, Real};
 use crate::ray::{Counters, HitPacket, Packet};
-use crate::scene::world::Object;
+use crate::scene::world::World;
 use crate::trace::query::Stack;
 
 /// Most rays that are traced together.
@@ -41,7 +41,7 @@ impl<S: Real> Visitors<S> {
     #[inline(always)]
     pub fn put<V: Lanes<Scalar = S>>(&mut self, k: usize, packet: &Packet<V>, t_max: V, lanes: u32) {
         if k == 0 {
-            self.chunk.start(RAYS);
+            self.chunk.start(RAYS, true);
             self.rays = 0;
             self.best.done = 0;
         }
@@ -51,18 +51,19 @@ impl<S: Real> Visitors<S> {
         self.rays |= Set::from(lanes) << (k * V::N);
     }
 
-    /// Traces the first `vectors` of them through an object, in its space.
+    /// Traces the first `vectors` of them through the object of instance `inst`, in its space.
     pub fn trace<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(
         &mut self,
         vectors: usize,
-        (object, inst): (&Object<S>, u32),
+        (world, inst): (&World<S>, u32),
         stack: &mut Stack<S>,
         counters: &mut Counters,
     ) {
         let Self { chunk, best, waiting, closer, sifted, rays } = self;
         chunk.len = vectors * V::N;
-        let mut walk = Walk::new(best, Room { waiting, closer, sifted }, stack, counters);
-        walk.plain = true;
+        let object = &world.objects[world.instances[inst as usize].object as usize];
+        let room = Room { waiting, closer, sifted };
+        let mut walk = Walk::new(best, room, stack, counters, !world.kinds.large);
         walk.octants::<V, ANY, COUNT>(object, inst, chunk, *rays);
     }
 

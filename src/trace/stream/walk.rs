@@ -10,7 +10,6 @@ use crate::lanes::words::prefetch_either;
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::Counters;
 use crate::scene::world::{Object, World};
-use crate::shape::sieve;
 use crate::trace::leaf as packet_leaf;
 use crate::trace::query::Stack;
 
@@ -88,11 +87,7 @@ pub struct Walk<'a, S> {
     pub counters: &'a mut Counters,
     /// Rays that wait to be tested.
     pub due: Due,
-    /// Whether none is to wait.
-    pub at_once: bool,
-    /// Closest-hit: hits may be those of the plain test, not the common formula's, where it is certain (see [`sift`]).
-    pub plain: bool,
-    /// Whether triangles are tested by [`sift`]: those of this object are within the bounds of [`sieve`].
+    /// Whether triangles are tested by [`sift`].
     pub sieve: bool,
     /// Tests of nodes' boxes, of rays of any octants.
     pub tests: u64,
@@ -101,10 +96,15 @@ pub struct Walk<'a, S> {
 impl<'a, S: Real> Walk<'a, S> {
     /// The beginning of a query.
     #[inline(always)]
-    pub fn new(best: &'a mut Best<S>, room: Room<'a, S>, stack: &'a mut Stack<S>, counters: &'a mut Counters) -> Self {
+    pub fn new(
+        best: &'a mut Best<S>,
+        room: Room<'a, S>,
+        stack: &'a mut Stack<S>,
+        counters: &'a mut Counters,
+        sieve: bool,
+    ) -> Self {
         let Room { waiting, closer, sifted } = room;
-        let (due, at_once) = (Due::default(), false);
-        Self { best, waiting, closer, sifted, stack, counters, due, at_once, plain: false, sieve: false, tests: 0 }
+        Self { best, waiting, closer, sifted, stack, counters, due: Due::default(), sieve, tests: 0 }
     }
 
     /// Traces a chunk of one octant, or a mixed one, through the whole world. `inside` is room for rays in an instance's space.
@@ -161,8 +161,7 @@ impl<'a, S: Real> Walk<'a, S> {
             return;
         }
         let Self { waiting, closer, sifted, stack, counters, .. } = self;
-        let mut walk = Walk::new(&mut inside.best, Room { waiting, closer, sifted }, stack, counters);
-        walk.plain = self.plain;
+        let mut walk = Walk::new(&mut inside.best, Room { waiting, closer, sifted }, stack, counters, self.sieve);
         walk.octants::<V, ANY, COUNT>(object, inst, &inside.chunk, rays);
         self.tests += walk.tests;
         inside.leave::<ANY>(self.best, inst);
@@ -221,13 +220,6 @@ impl<'a, S: Real> Walk<'a, S> {
                 packet_leaf::unbounded(object, inst, packet, query, lanes);
             });
         }
-        let most = S::from_f64(sieve::MOST);
-        let bounds = [object.tree.bounds.lo, object.tree.bounds.hi];
-        // Few rays are mostly alone at a leaf, where the sieve costs more than the common formula.
-        let few = rays.count_ones() < due::LEAST;
-        let wanted = if ANY { !few } else { self.plain };
-        self.sieve = wanted && bounds.as_flattened().iter().all(|x| Lanes::abs(*x) <= most);
-        self.at_once = !self.sieve || few;
         let at = |child: Child| child.index as usize;
         self.tree::<V, _, ANY, COUNT, MIXED>(
             &object.tree,
@@ -299,26 +291,16 @@ impl<'a, S: Real> Walk<'a, S> {
                     self.counters.node_lanes_total += RAYS as u64;
                 }
                 let t = &self.best.t;
-                if rays & (rays - 1) == 0 {
-                    let ray = rays.trailing_zeros() as usize & (RAYS - 1);
-                    let octant = if MIXED { chunk.octant[ray].into() } else { octant };
-                    let (children, near) = node::alone::<E, W>(node, chunk, t, ray, octant);
-                    if children != 0 {
-                        child = self.choose_alone::<E, W, ANY>(node, (children, near), rays, &fetch);
-                        continue;
+                let met = match &chunk.region {
+                    Some(region) if MIXED && ANY => {
+                        mixed::meet::<V, E, W>(node, chunk, region, t, rays, &mut self.tests)
                     }
-                } else {
-                    let met = match &chunk.region {
-                        Some(region) if MIXED && ANY => {
-                            mixed::meet::<V, E, W>(node, chunk, region, t, rays, &mut self.tests)
-                        }
-                        None if MIXED => mixed::sparse::<E, W, ANY>(node, chunk, t, rays),
-                        _ => node::meet::<V, E, W, ANY>(node, chunk, t, rays, octant),
-                    };
-                    if met.children != 0 {
-                        (child, rays) = self.choose::<E, W, ANY>(node, &met, &fetch);
-                        continue;
-                    }
+                    None if MIXED => mixed::sparse::<E, W, ANY>(node, chunk, t, rays),
+                    _ => node::meet::<V, E, W, ANY>(node, chunk, t, rays, octant),
+                };
+                if met.children != 0 {
+                    (child, rays) = self.choose::<E, W, ANY>(node, &met, &fetch);
+                    continue;
                 }
             } else if rays != 0 {
                 leaf(self, child, rays);
@@ -374,56 +356,5 @@ impl<'a, S: Real> Walk<'a, S> {
         }
         self.waiting.len += last;
         (node.child(next), met.rays(next))
-    }
-    /// The same for a ray that is alone.
-    #[inline(always)]
-    fn choose_alone<E: Lanes<Scalar = S>, const W: usize, const ANY: bool>(
-        &mut self,
-        node: &Node<S, W>,
-        (children, near): (u32, E),
-        rays: Set,
-        fetch: &impl Fn(Child),
-    ) -> Child {
-        let mut rest = children & (children - 1);
-        if rest == 0 {
-            let child = node.child(children.trailing_zeros() as usize & (W - 1));
-            fetch(child);
-            return child;
-        }
-        let last = rest.count_ones() as usize;
-        let places = &mut self.waiting.room()[..W];
-        if ANY {
-            rest = children;
-            for place in places.iter_mut().take(last) {
-                let slot = rest.ilog2() as usize & (W - 1);
-                rest &= !(1 << slot);
-                let child = node.child(slot);
-                fetch(child);
-                *place = Waiting { rays, near: S::ZERO, bound: false, child };
-            }
-            self.waiting.len += last;
-            let child = node.child(rest.trailing_zeros() as usize & (W - 1));
-            fetch(child);
-            return child;
-        }
-        let mut nears = [S::ZERO; W];
-        near.store(&mut nears);
-        rest = children;
-        let near = near.fast_max(E::splat(S::LOWEST));
-        let mut next = 0;
-        while rest != 0 {
-            let slot = rest.trailing_zeros() as usize & (W - 1);
-            rest &= rest - 1;
-            let child = node.child(slot);
-            fetch(child);
-            let before = (1 << slot) - 1;
-            let own = E::splat(nears[slot]).fast_max(E::splat(S::LOWEST));
-            let farther = own.cmp_lt(near).bits() & !before | own.cmp_le(near).bits() & before;
-            let place = (farther & children).count_ones() as usize & (W - 1);
-            next = if place == last { slot } else { next };
-            places[place] = Waiting { rays, near: nears[slot], bound: true, child };
-        }
-        self.waiting.len += last;
-        node.child(next)
     }
 }

@@ -21,7 +21,6 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
     (visitors, stack): (&mut Visitors<f32>, &mut Stack<f32>),
     counters: &mut Counters,
 ) {
-    let object = &exact.world.objects[exact.world.instances[inst as usize].object as usize];
     let (mut rest, mut touched) = (wanted, 0);
     while rest != 0 {
         let (mut of, mut count) = ([0; MOST / V::N], 0);
@@ -44,7 +43,7 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
         if count == 0 {
             continue;
         }
-        visitors.trace::<V, ANY, COUNT>(count, (object, inst), stack, counters);
+        visitors.trace::<V, ANY, COUNT>(count, (exact.world, inst), stack, counters);
         for (k, &g) in of.iter().enumerate().take(count) {
             let found = match ANY {
                 true => occlude(groups, g, Mask::from_bits(visitors.done::<V>(k))),
