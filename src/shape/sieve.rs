@@ -7,12 +7,14 @@
 //! **Bounds.** With `u` half an ulp of 1, sums of absolute components as sizes, `p` and `q` the sides that leave the first corner, `e`
 //! the sum of their sizes, `c` the size of the way from the ray's start to that corner, `d` that of the direction: edge functions come
 //! out as products of three such numbers, and
-//! * the plain test is off by at most `17 u d e (c + e)`: one rounding for each difference, three for a cross product, three for a
-//!   scalar one, and the third function is what the others leave of the volume;
-//! * the common formula moves each corner by at most `8 u (c + e)` in the plane across the ray; so an edge function of a line that
-//!   passes the triangle at `e + 8 u c` at most, as its box test demands, is off by `64 u d (e + 8 u c)(c + e)`.
+//! * the plain test is off by at most `10 u d e (c + e)`: one rounding for each of two differences, two for a cross product, three for a
+//!   scalar one make 7; the third function, which is what the others leave of the volume, has their errors and the volume's;
+//! * the common formula takes each corner to two coordinates across the ray, `x = s z + X`, where a rounding of `z` and `X`, two of the
+//!   slope `s`, which is at most 1, and two of the result make the two coordinates of a corner together wrong by `u (8 c + 10 e)` at most;
+//!   an edge function of a line that passes the triangle at `e + 16 u c` at most, as its box test demands, is a sum of two products of such
+//!   coordinates, so off by `24 u d (e + 16 u c)(c + e)`.
 //!
-//! So beyond `128 u d (e + 64 u c)(c + e)` ([`EDGES`], [`NEAR`]) both have the same sign. The parameter is normal times way over normal
+//! So beyond `64 u d (e + 64 u c)(c + e)` ([`EDGES`], [`NEAR`]) both have the same sign. The parameter is normal times way over normal
 //! times direction. The first is off by `8 u |p| |q| c` in the plain test and `5 u |p| |q| c` in the common formula, whose normal is
 //! exact; the second by `7 u |p| |q| d` and `4 u |p| |q| d`; and the common formula moves a hit into the triangle's box, by `8 u t` at
 //! most. So within `20 u |p| |q| (c + d t)` ([`DEPTHS`]) the order of two parameters is in doubt, and all is where normal times direction
@@ -25,7 +27,7 @@ use crate::lanes::{Lanes, Lanes3, Real, dot, each, map3};
 use crate::math::Aabb;
 
 /// Bound of edge functions, in half ulps.
-const EDGES: f64 = 128.0;
+const EDGES: f64 = 64.0;
 
 /// How far from a triangle lines are that the common formula may take for hits, in half ulps of the distance.
 const NEAR: f64 = 64.0;

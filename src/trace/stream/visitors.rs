@@ -39,9 +39,9 @@ impl<S: Real> Visitors<S> {
 
     /// Puts vector `k` of those that [`Visitors::trace`] is for; rays of `lanes` are traced up to `t_max`.
     #[inline(always)]
-    pub fn put<V: Lanes<Scalar = S>>(&mut self, k: usize, packet: &Packet<V>, t_max: V, lanes: u32) {
+    pub fn put<V: Lanes<Scalar = S>>(&mut self, k: usize, (packet, sheared): (&Packet<V>, bool), t_max: V, lanes: u32) {
         if k == 0 {
-            self.chunk.start(RAYS, true);
+            self.chunk.start(RAYS, sheared);
             self.rays = 0;
             self.best.done = 0;
         }

@@ -21,6 +21,7 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
     (visitors, stack): (&mut Visitors<f32>, &mut Stack<f32>),
     counters: &mut Counters,
 ) {
+    let sheared = exact.world.kinds.ask_for_shear();
     let (mut rest, mut touched) = (wanted, 0);
     while rest != 0 {
         let (mut of, mut count) = ([0; MOST / V::N], 0);
@@ -34,8 +35,8 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
             };
             let tame = exact.bundle.tame[g];
             let lanes = tame & !groups.done(g, tame);
-            if let Some((packet, t_max, lanes)) = enter(exact, inst, g, limit, lanes) {
-                visitors.put(count, &packet, t_max, lanes);
+            if let Some((packet, t_max, lanes)) = enter(exact, inst, g, limit, (lanes, sheared)) {
+                visitors.put(count, (&packet, sheared), t_max, lanes);
                 of[count] = g;
                 count += 1;
             }

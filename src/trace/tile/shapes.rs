@@ -18,20 +18,26 @@ use crate::trace::leaf;
 use crate::trace::query::{Query, Stack};
 
 /// The rays of a group in the space of an instance, their ends or `limit`, whichever is nearer, and those of `lanes` that meet its
-/// box; `None` if none does.
+/// box; `None` if none does. `sheared`: see [`Packet::prepared`].
 #[inline(always)]
-pub fn enter(exact: &Exact, inst: u32, g: usize, limit: V, lanes: u32) -> Option<(Packet<V>, V, u32)> {
+pub fn enter(
+    exact: &Exact,
+    inst: u32,
+    g: usize,
+    limit: V,
+    (lanes, sheared): (u32, bool),
+) -> Option<(Packet<V>, V, u32)> {
     let Segments { org, dir, t_min, t_max } = exact.bundle.segments(g);
     // What is no number limits nothing.
     let t_max = limit.fast_min(t_max);
     let instance = &exact.world.instances[inst as usize];
     if instance.identity {
-        return (lanes != 0).then(|| (Packet::new(org, dir, t_min), t_max, lanes));
+        return (lanes != 0).then(|| (Packet::prepared(org, dir, t_min, sheared), t_max, lanes));
     }
     let packet = Packet::unsheared(org, dir, t_min);
     let interval = Interval::of(&packet, instance.bounds.lo, instance.bounds.hi);
     let lanes = interval.meets(t_min, t_max).bits() & lanes;
-    (lanes != 0).then(|| (packet.into_local(&instance.to_local, interval.near), t_max, lanes))
+    (lanes != 0).then(|| (packet.brought_in(&instance.to_local, interval.near, sheared), t_max, lanes))
 }
 
 /// Tests a leaf of an instance's shapes against `wanted` groups of `N` sets.
@@ -51,7 +57,9 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
         rest &= rest - 1;
         let tame = exact.bundle.tame[g];
         let lanes = tame & !groups.done(g, tame);
-        let Some((packet, t_max, lanes)) = enter(exact, inst, g, V::splat(f32::INFINITY), lanes) else { continue };
+        let Some((packet, t_max, lanes)) = enter(exact, inst, g, V::splat(f32::INFINITY), (lanes, true)) else {
+            continue;
+        };
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), stack, counters);
         leaf::block(object, inst, &packet, &mut query, leaf, lanes);
         let (hit, done) = (query.hit, query.done);
