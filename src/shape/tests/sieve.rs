@@ -192,3 +192,72 @@ fn is_seldom_in_doubt() {
     }
     assert!(counts[1] > 1000 && counts[0] * 50 < counts[1], "{counts:?} in doubt, sure");
 }
+
+/// What the two tests' edge functions are off by at most, over `u d e (c + e)` and `u d e' (c + e)`: see the bounds in `shape/sieve.rs`.
+fn worst_edges(block: &TriangleBlock<f32>, ray: &Ray<f32>) -> [f64; 2] {
+    let one = Packet::<f32>::new(ray.org, ray.dir, ray.t_min);
+    let axis = (0..3).find(|&axis| one.dominant[axis] != 0).unwrap();
+    let (_, functions) = Triangle::candidates(&Turned::of(&one, axis), ray.t_min, ray.t_max, block);
+    let splat = |v: [f32; 3]| map3(v, <f32 as Real>::Octo::splat);
+    let line = Line {
+        org: splat(ray.org),
+        dir: splat(ray.dir),
+        gauge: gauge(splat(ray.org), splat(ray.dir)),
+        t_min: Lanes::splat(ray.t_min),
+        t_low: Lanes::splat(ray.t_min),
+        t_max: Lanes::splat(ray.t_max),
+    };
+    let sieve = Sieve::<<f32 as Real>::Octo>::new(|f| Lanes::load(&block.fields[f]));
+    let sieved = sieve.test::<false>(&line);
+    let (org, dir) = (DVec3::from(ray.org.map(f64::from)), DVec3::from(ray.dir.map(f64::from)));
+    let sum = |v: DVec3| v.abs().element_sum();
+    let u = f64::from(f32::EPSILON) / 2.0;
+    let mut worst = [0.0f64; 2];
+    for slot in 0..BLOCK {
+        let [a, b, c] = Triangle::corners(&block.get(slot)).map(|corner| corner - org);
+        let (p, q) = (b - a, c - a);
+        let (away, reach) = (sum(a), sum(p) + sum(q));
+        let exact = [a.cross(dir).dot(q), -a.cross(dir).dot(p), b.cross(dir).dot(b - c)];
+        let [v, w, all] = [sieved.weights[0], sieved.weights[1], sieved.speed].map(|x| x.lane(slot));
+        let off = |facing: f64| {
+            let each =
+                [v, w, all - v - w].into_iter().zip(exact).map(|(got, want)| (f64::from(got) - facing * want).abs());
+            each.fold(0.0, f64::max) / (u * sum(dir) * reach * (away + reach))
+        };
+        // Seen edge-on, which side a triangle turns to the ray is lost, and no matter.
+        worst[0] = worst[0].max(off(1.0).min(off(-1.0)));
+        // As the common formula has it, without rounding.
+        let [k, x, y] = [0, 1, 2].map(|i| (axis + i) % 3);
+        let flat = [a, b, c].map(|v| [v[x] - dir[x] / dir[k] * v[k], v[y] - dir[y] / dir[k] * v[k]]);
+        let near = reach + 16.0 * u * away;
+        if flat.as_flattened().iter().any(|x| x.abs() > near) {
+            continue;
+        }
+        for (i, function) in functions.iter().enumerate() {
+            let [one, other] = [flat[(i + 2) % 3], flat[(i + 1) % 3]];
+            let (got, want) = (f64::from(function.lane(slot)), one[0] * other[1] - one[1] * other[0]);
+            let off = (got - want).abs() * dir[k].abs();
+            worst[1] = worst[1].max(off / (u * sum(dir) * near * (away + reach)));
+        }
+    }
+    worst
+}
+
+/// The two terms that the bound of edge functions is made of, against the same functions in f64.
+#[test]
+fn edge_functions_are_off_by_no_more_than_is_said() {
+    let mut r = Random(11);
+    let mut worst = [0.0f64; 2];
+    for round in 0..200_000 {
+        let far = [1.0, 10.0, 1e3, 1e6][round % 4];
+        let block = triangles::<f32>(&mut r, round / 4 % 4, far, 1.0);
+        let mut ray = aimed(&mut r, &block, [1.0, 0.1, 100.0, 1e5][round / 16 % 4]);
+        if Triangle::along_a_face(ray.dir).any() {
+            ray.dir = ray.dir.map(|x| if x == 0.0 { 0.01 } else { x });
+        }
+        let found = worst_edges(&block, &ray);
+        worst = [worst[0].max(found[0]), worst[1].max(found[1])];
+    }
+    let [plain, common] = worst;
+    assert!((0.5..10.0).contains(&plain) && (0.5..24.0).contains(&common), "{worst:?} half ulps");
+}

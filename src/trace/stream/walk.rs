@@ -295,7 +295,7 @@ impl<'a, S: Real> Walk<'a, S> {
                     Some(region) if MIXED && ANY => {
                         mixed::meet::<V, E, W>(node, chunk, region, t, rays, &mut self.tests)
                     }
-                    None if MIXED => mixed::sparse::<E, W, ANY>(node, chunk, t, rays),
+                    _ if MIXED => mixed::sparse::<E, W, ANY>(node, chunk, t, rays),
                     _ => node::meet::<V, E, W, ANY>(node, chunk, t, rays, octant),
                 };
                 if met.children != 0 {
