@@ -111,3 +111,91 @@ impl<S: Real> Inside<S> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DAffine3, DQuat, DVec3};
+
+    use super::super::chunk::row;
+    use super::*;
+    use crate::lanes::rows::{Row, to_rows};
+    use crate::lanes::{each, f32x8, f32x16, f64x8};
+    use crate::math::{Aabb, Affine, Random};
+    use crate::ray::Rays;
+
+    /// Some rays of a chunk enter a turned instance, some of them hit something there.
+    fn check<V: Lanes>() {
+        let mut r = Random(7);
+        let numbers = |r: &mut Random, size: f64| each(|_| V::Scalar::from_f64(size * (2.0 * r.unit() - 1.0)));
+        let (mut entered, mut kept_out) = (0, 0);
+        for round in 0..400 {
+            let mut rays = Rays::<V::Scalar>::new(RAYS);
+            for i in 0..RAYS {
+                rays.set(i, numbers(&mut r, 3.0), numbers(&mut r, 1.0), V::Scalar::ZERO, V::Scalar::from_f64(4.0));
+            }
+            let (mut rows, places) = (vec![Row::ZERO; RAYS], (0..RAYS as u32).collect::<Vec<_>>());
+            for at in (0..RAYS).step_by(V::N) {
+                let (packet, t_max, _) = Packet::<V>::load(&rays, at);
+                to_rows(row(&packet, t_max), &mut rows[at..]);
+            }
+            let (mut chunk, mut best) = (Chunk::default(), Best::default());
+            chunk.gather::<V, false>(&rows, &places, &mut best.t, round % 2 == 0);
+            best.start();
+            let turn = DQuat::from_scaled_axis(DVec3::new(1.0, 2.0, 0.5) * r.unit());
+            let map =
+                DAffine3::from_scale_rotation_translation(DVec3::new(2.0, 1.0, 0.5), turn, DVec3::splat(r.unit()));
+            let (lo, hi) = ([V::Scalar::from_f64(-1.0); 3], [V::Scalar::from_f64(1.0); 3]);
+            let to_local = Affine::from_f64(&map.inverse());
+            let instance = Instance { object: 0, identity: false, to_local, bounds: Aabb { lo, hi } };
+            let rays_wanted = match round % 5 {
+                0 => 1 << (round % RAYS),
+                1 => 0b1011 << (round % 100),
+                2 => Set::MAX / 0xff << (round % 8),
+                3 => Set::MAX >> (round % 100),
+                _ => Set::MAX,
+            };
+            let mut inside = Inside::default();
+            let met = inside.enter::<V>((&chunk, &best), &instance, rays_wanted);
+            let (mut k, mut of) = (0, Vec::new());
+            for i in (0..RAYS).filter(|i| rays_wanted >> i & 1 != 0) {
+                let one = Packet::<V::Scalar>::new(rays.org(i), rays.dir(i), V::Scalar::ZERO);
+                let interval = Interval::of(&one, lo, hi);
+                let meets = interval.meets(one.t_min, best.t[i]);
+                assert_eq!(met >> k & 1 != 0, meets, "round {round}: ray {i} meets the box or not");
+                (entered, kept_out) = (entered + u32::from(meets), kept_out + u32::from(!meets));
+                let local = one.into_local(&instance.to_local, interval.near);
+                for a in 0..3 {
+                    let found = [inside.chunk.org[a][k], inside.chunk.dir[a][k], inside.chunk.rcp[a][k]];
+                    assert_eq!(found, [local.org[a], local.dir[a], local.rcp[a]], "round {round}: ray {i}");
+                }
+                assert_eq!((inside.chunk.t_min[k], inside.chunk.t_floor[k]), (local.t_min, local.t_floor));
+                let octant = (0..3).fold(0, |o, a| o | u8::from(local.rcp[a] < V::Scalar::ZERO) << a);
+                assert!(!inside.chunk.mixed || inside.chunk.octant[k] == octant, "round {round}: ray {i}");
+                of.push(i);
+                k += 1;
+            }
+            assert_eq!(met >> (k - 1) >> 1, 0, "no more rays than were sent");
+            let before = best.clone();
+            for (k, &i) in of.iter().enumerate().step_by(3) {
+                inside.best.offer(k, [V::Scalar::from_f64(0.5), V::Scalar::ONE, V::Scalar::ZERO], i as u32, 9);
+                inside.best.done |= 1 << k;
+            }
+            inside.leave::<true>(&mut best, 9);
+            inside.leave::<false>(&mut best, 9);
+            for i in 0..RAYS {
+                let hit = of.iter().step_by(3).any(|&of| of == i);
+                assert_eq!(best.done >> i & 1 != 0, hit, "round {round}: ray {i}");
+                let want = if hit { (V::Scalar::from_f64(0.5), 9) } else { (before.t[i], before.inst[i]) };
+                assert_eq!((best.t[i], best.inst[i]), want, "round {round}: ray {i}");
+            }
+        }
+        assert!(entered > 1000 && kept_out > 1000, "{entered} {kept_out}");
+    }
+
+    #[test]
+    fn rays_inside_are_those_outside() {
+        check::<f32x16>();
+        check::<f32x8>();
+        check::<f64x8>();
+    }
+}
