@@ -14,12 +14,12 @@
 //!   an edge function of a line that passes the triangle at `e + 16 u c` at most, as its box test demands, is a sum of two products of such
 //!   coordinates, so off by `24 u d (e + 16 u c)(c + e)`.
 //!
-//! So beyond `40 u d (e + 64 u c)(c + e)` ([`EDGES`], [`NEAR`]), which is a sixth more than both together, both have the same sign. The parameter is normal times way over normal
-//! times direction. The first is off by `8 u |p| |q| c` in the plain test and `5 u |p| |q| c` in the common formula, whose normal is
-//! exact; the second by `7 u |p| |q| d` and `4 u |p| |q| d`; and the common formula moves a hit into the triangle's box, by `8 u t` at
-//! most. So within `20 u |p| |q| (c + d t)` ([`DEPTHS`]) the order of two parameters is in doubt, and all is where normal times direction
-//! is hardly more than its bound ([`STEEP`]). What products lose below the smallest number is less than [`tiny`] where no coordinate
-//! is beyond [`MOST`].
+//! So beyond `40 u d (e + 64 u c)(c + e)` ([`EDGES`], [`NEAR`]), which is a sixth more than both together, both have the same sign.
+//! The parameter is normal times way over normal times direction. The first is off by `8 u |p| |q| c` in the plain test and
+//! `5 u |p| |q| c` in the common formula, whose normal is exact; the second by `7 u |p| |q| d` and `4 u |p| |q| d`; and the common formula
+//! moves a hit into the triangle's box, by `8 u t` at most. So within `20 u |p| |q| (c + d t)` ([`DEPTHS`]) the order of two parameters is
+//! in doubt, and all is where normal times direction is hardly more than its bound ([`STEEP`]). What products lose below the smallest
+//! number is less than [`tiny`] where no coordinate is beyond [`MOST`].
 
 use super::block::BLOCK;
 use super::triangle::Triangle;
