@@ -151,14 +151,14 @@ pub struct Kinds {
     pub shapes: bool,
     /// Half-spaces or trees of solids.
     pub others: bool,
-    /// Triangles with coordinates beyond the bounds of [`crate::shape::sieve`].
+    /// Triangles with coordinates so large (above 2^24) that all are left to the formula that engines have in common.
     pub large: bool,
     /// What repays sorting rays that part: solids of many leaves, or a tree that is large for narrow lanes.
     pub sorting: bool,
 }
 
 impl Kinds {
-    /// Whether something asks for a packet's shear where meshes are tested by [`crate::shape::sieve`].
+    /// Whether something asks for a packet's shear where streams test meshes by a test that does not.
     pub fn ask_for_shear(&self) -> bool {
         self.large || self.others
     }

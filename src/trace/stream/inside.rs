@@ -150,7 +150,7 @@ mod tests {
             let rays_wanted = match round % 5 {
                 0 => 1 << (round % RAYS),
                 1 => 0b1011 << (round % 100),
-                2 => Set::MAX / 0xff << (round % 8),
+                2 => (Set::MAX / 0xff) << (round % 8),
                 3 => Set::MAX >> (round % 100),
                 _ => Set::MAX,
             };
