@@ -222,19 +222,11 @@ impl<S: Real> Chunk<S> {
         if self.sheared {
             return (self.turned(ray), self.splat(ray));
         }
-        let [org, dir] = [&self.org, &self.dir].map(|v| each(|a| v[a][ray]));
-        let one = Packet { t_floor: self.t_floor[ray], ..Packet::<S>::new(org, dir, self.t_min[ray]) };
+        let [org, dir] = [&self.org, &self.dir].map(|v| each(|a| S::Octo::splat(v[a][ray])));
+        let [t_min, t_floor] = [&self.t_min, &self.t_floor].map(|x| S::Octo::splat(x[ray]));
+        let packet = Packet { t_floor, ..Packet::new(org, dir, t_min) };
+        let one = packet.single(0);
         let axis = usize::from(one.dominant[1] != 0) + 2 * usize::from(one.dominant[2] != 0);
-        let splat3 = |v: Lanes3<S>| map3(v, S::Octo::splat);
-        let packet = Packet {
-            org: splat3(org),
-            dir: splat3(dir),
-            rcp: splat3(one.rcp),
-            t_min: S::Octo::splat(one.t_min),
-            t_floor: S::Octo::splat(one.t_floor),
-            dominant: one.dominant.map(|bits| if bits != 0 { S::Octo::ALL } else { 0 }),
-            shear: splat3(one.shear),
-        };
         (Turned::of(&one, axis), packet)
     }
 
