@@ -14,7 +14,9 @@ const MIXED: usize = 32;
 /// Rays that go through an instance, and what they have found.
 #[derive(Clone, Debug)]
 pub struct Inside<S> {
+    /// The rays, in the instance's space.
     pub chunk: Chunk<S>,
+    /// What they have found, with what they came with.
     pub best: Best<S>,
     /// Where each is in the chunk that it is of.
     of: [u8; RAYS],
