@@ -1,17 +1,13 @@
 //! The engine as others see it.
 
 use super::bundle::Bundle;
-use super::{BLOCK, GROUPS, Job, SET, SETS, Tile, suits};
+use super::{GROUPS, Job, SET, SETS, Tile, node, suits};
 use crate::lanes::past::arrived;
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, Hits, Pencil, Rays};
 use crate::scene::world::World;
 use crate::trace::output::Output;
 use crate::trace::{Engine, Scratch};
-
-/// Calls with more rays than this write hits past the caches: they hold the last ones at most, and whoever asks so much at
-/// once does not read them at once.
-pub const MANY: usize = 2 * BLOCK;
 
 impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
     fn name(&self) -> &'static str {
@@ -72,6 +68,22 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
 }
 
 impl Job<'_> {
+    /// Waits until all answers are where others find them.
+    pub fn end(&self) {
+        if self.past {
+            arrived();
+        }
+    }
+
+    /// Room for the levels of every way through the world.
+    pub fn make_levels(&mut self) {
+        let below = self.world.objects.iter().map(|object| node::levels(&object.tree)).max().unwrap_or(0);
+        let depth = node::levels(&self.world.top) + below + 1;
+        if self.memory.levels.len() < depth {
+            self.memory.levels.resize(depth, node::Level::default());
+        }
+    }
+
     /// Traces a pencil as one tile; false if that cannot be.
     fn pencil<const EXACT: bool, const COUNT: bool>(&mut self, pencil: &Pencil) -> bool {
         if EXACT || self.most != GROUPS || !suits(self.world, EXACT) {
@@ -88,6 +100,7 @@ impl Job<'_> {
         };
         let is_done = traced && self.memory.apart.is_empty();
         self.memory.apart.clear();
+        self.end();
         is_done
     }
 }
@@ -105,8 +118,5 @@ fn call<const ANY: bool, const EXACT: bool>(
         None => {
             Job::new(world, rays, scratch, &mut Counters::default(), output, most).run::<ANY, EXACT, false>();
         }
-    }
-    if rays.len() > MANY {
-        arrived();
     }
 }

@@ -5,7 +5,7 @@ use super::exact::Exact;
 use super::groups::Groups;
 use super::own::occlude;
 use super::shapes::{enter, take};
-use super::{GROUPS, HALF_ULP, Mask, SET, V};
+use super::{GROUPS, HALF_ULP, Mask, V};
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::Counters;
 use crate::trace::query::Stack;
@@ -50,7 +50,7 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
                 true => occlude(groups, g, Mask::from_bits(visitors.done::<V>(k))),
                 false => take(groups, g, &visitors.hits(k), inst),
             };
-            touched |= u32::from(found) << (g / SET);
+            touched |= u64::from(found) << g;
         }
     }
     if touched != 0 {

@@ -2,6 +2,7 @@
 
 use super::bundle::{Bundle, Shared, Source};
 use super::columns::{AHEAD, Columns};
+use super::even::Even;
 use super::frame::Frame;
 use super::lines::Lines;
 use super::listing;
@@ -83,7 +84,7 @@ pub struct Groups {
     pub is_behind: bool,
     /// While a set's rays are loaded: s, t, -s, -t of each group, a quarter of a vector each ([`quarters`]). Greatest values as
     /// least negatives: one kind of shuffle tree does both.
-    ends: [V; SET],
+    pub ends: [V; SET],
     /// How far behind, by group and in the rays' parameter. Apart from [`Group`], as other tiles do not need it.
     behind: [V; GROUPS],
     /// Own answers: which part of the way from that point to the best hit is ahead of the start.
@@ -94,14 +95,14 @@ pub struct Groups {
     pub loose: f32,
     /// Per group, sixteen in the lanes of a vector: least and greatest s, least and greatest t.
     pub rect: [[[V; SETS]; 2]; 2],
+    /// The same as rectangles of one size, if they nearly are.
+    pub even: Option<Even>,
     /// The same as fractions of the tile's rectangle.
     pub part: [[[V; SETS]; 2]; 2],
     /// Rays with a common end: factor of [`Group::inv_lo`] that makes it sure. Else 1, and it is sure by itself.
     pub reach: f32,
     /// Per group: least [`Group::inv_lo`], sure.
     pub least: [V; SETS],
-    /// Per group: farthest depth that is still of interest; minus infinity for none.
-    pub far: [V; SETS],
     /// Farthest of all groups.
     pub farthest: f32,
     /// Least [`Groups::least`] of all: a triangle that is farther everywhere is of no interest.
@@ -136,10 +137,10 @@ impl Default for Groups {
             front: 0.0,
             loose: 0.0,
             rect: [[zero; 2]; 2],
+            even: None,
             part: [[zero; 2]; 2],
             reach: 1.0,
             least: zero,
-            far: zero,
             farthest: 0.0,
             nearest: 0.0,
             bounds: [[0.0; 2]; 2],
@@ -178,66 +179,71 @@ impl Groups {
             Source::Pencil(..) => None,
         };
         let from = bundle.first / V::N;
-        for q in 0..N {
-            for i in 0..SET {
-                let g = q * SET + i;
-                self.of[g].slot = [NO_SLOT; 16];
-                let mut tame = if groups >> g & 1 != 0 { bundle.tame[g] } else { 0 };
-                let mut segments = None;
-                if let Some(columns) = &columns
-                    && tame != 0
-                {
-                    let group = segments.insert(columns.get(from + g));
-                    if bundle.presumed {
-                        columns.prefetch(from + g + AHEAD);
-                        let Some(lanes) = bundle.look::<ANY>(g, group, &mut look) else { return false };
-                        (tame, bundle.tame[g]) = (lanes, lanes);
+        let full = !EXACT && self.fill::<N>(bundle);
+        if full {
+            whole = u64::MAX >> (GROUPS - N * SET);
+        } else {
+            for q in 0..N {
+                for i in 0..SET {
+                    let g = q * SET + i;
+                    self.of[g].slot = [NO_SLOT; 16];
+                    let mut tame = if groups >> g & 1 != 0 { bundle.tame[g] } else { 0 };
+                    let mut segments = None;
+                    if let Some(columns) = &columns
+                        && tame != 0
+                    {
+                        let group = segments.insert(columns.get(from + g));
+                        if bundle.presumed {
+                            columns.prefetch(from + g + AHEAD);
+                            let Some(lanes) = bundle.look::<ANY>(g, group, &mut look) else { return false };
+                            (tame, bundle.tame[g]) = (lanes, lanes);
+                        }
+                    }
+                    if tame == 0 {
+                        (self.of[g].inv_lo, self.of[g].inv_hi) = (most, most);
+                        self.ends[i] = most;
+                        whole |= 1 << g;
+                        continue;
+                    }
+                    let lines = match &segments {
+                        Some(segments) => Lines::of(&self.frame, bundle, segments, tame),
+                        None => Lines::of_pencil(&self.frame, bundle, g),
+                    };
+                    if tame & !lines.fit != 0 {
+                        return false;
+                    }
+                    let lanes = Mask::from_bits(tame);
+                    (self.of[g].s, self.of[g].t, self.of[g].slowness) = (lines.s, lines.t, lines.slowness);
+                    if bundle.shared != Shared::Start {
+                        self.of[g].start = map3(lines.start, |x| x * V::splat(self.frame.scale));
+                    }
+                    let ends = [lines.s, lines.t, -lines.s, -lines.t];
+                    self.ends[i] = quarters(ends.map(|end| select(lanes, end, most)));
+                    self.of[g].inv_lo = select(lanes, bounded(lines.far), most);
+                    live |= 1 << g;
+                    whole |= u64::from(lines.whole) << g;
+                    if EXACT || !lines.whole {
+                        near = select(lanes, lines.near, most).fast_min(near);
+                        self.of[g].inv_hi = select(lanes, if EXACT { lines.far } else { lines.near }, most);
+                    }
+                    if ANY {
+                        reach = select(lanes, lines.reach, reach).fast_max(reach);
+                    }
+                    if bundle.shared == Shared::Behind {
+                        self.behind[g] = lines.behind;
+                        front = select(lanes, lines.behind / lines.slowness, front).fast_min(front);
                     }
                 }
-                if tame == 0 {
-                    (self.of[g].inv_lo, self.of[g].inv_hi) = (most, most);
-                    self.ends[i] = most;
-                    whole |= 1 << g;
-                    continue;
+                let [low_s, low_t, high_s, high_t] = quarter_minima(&self.ends);
+                self.rect[0][0][q] = low_s;
+                self.rect[0][1][q] = -high_s;
+                self.rect[1][0][q] = low_t;
+                self.rect[1][1][q] = -high_t;
+                let [whole, live] = [whole, live].map(|groups: u64| (groups >> (q * SET)) as u32 & 0xffff);
+                match !EXACT && bundle.shared == Shared::Start && whole == 0xffff {
+                    true => self.least[q] = select(Mask::from_bits(live), V::constant(0.0), most),
+                    false => self.look_far(q),
                 }
-                let lines = match &segments {
-                    Some(segments) => Lines::of(&self.frame, bundle, segments, tame),
-                    None => Lines::of_pencil(&self.frame, bundle, g),
-                };
-                if tame & !lines.fit != 0 {
-                    return false;
-                }
-                let lanes = Mask::from_bits(tame);
-                (self.of[g].s, self.of[g].t, self.of[g].slowness) = (lines.s, lines.t, lines.slowness);
-                if bundle.shared != Shared::Start {
-                    self.of[g].start = map3(lines.start, |x| x * V::splat(self.frame.scale));
-                }
-                let ends = [lines.s, lines.t, -lines.s, -lines.t];
-                self.ends[i] = quarters(ends.map(|end| select(lanes, end, most)));
-                self.of[g].inv_lo = select(lanes, bounded(lines.far), most);
-                live |= 1 << g;
-                whole |= u64::from(lines.whole) << g;
-                if EXACT || !lines.whole {
-                    near = select(lanes, lines.near, most).fast_min(near);
-                    self.of[g].inv_hi = select(lanes, if EXACT { lines.far } else { lines.near }, most);
-                }
-                if ANY {
-                    reach = select(lanes, lines.reach, reach).fast_max(reach);
-                }
-                if bundle.shared == Shared::Behind {
-                    self.behind[g] = lines.behind;
-                    front = select(lanes, lines.behind / lines.slowness, front).fast_min(front);
-                }
-            }
-            let [low_s, low_t, high_s, high_t] = quarter_minima(&self.ends);
-            self.rect[0][0][q] = low_s;
-            self.rect[0][1][q] = -high_s;
-            self.rect[1][0][q] = low_t;
-            self.rect[1][1][q] = -high_t;
-            let [whole, live] = [whole, live].map(|groups: u64| (groups >> (q * SET)) as u32 & 0xffff);
-            match !EXACT && bundle.shared == Shared::Start && whole == 0xffff {
-                true => self.least[q] = select(Mask::from_bits(live), V::constant(0.0), most),
-                false => self.look_far(q),
             }
         }
         if ANY && bundle.presumed && !bundle.confirm(&look) {
@@ -256,6 +262,7 @@ impl Groups {
         if self.wide >= WIDEST {
             return false;
         }
+        self.even = if full { Even::of::<N>(self) } else { None };
         for axis in 0..2 {
             let [lo, hi] = self.bounds[axis];
             let scale = V::splat(if hi > lo { 1.0 / (hi - lo) } else { 0.0 });
@@ -285,7 +292,7 @@ impl Groups {
         if EXACT || bundle.shared != Shared::Start {
             self.loosen::<N, ANY, EXACT>(near);
         }
-        self.settle::<N>(u32::MAX);
+        self.settle::<N>();
         true
     }
 
@@ -330,14 +337,14 @@ impl Groups {
         f[0].mul_add(s, f[1].mul_add(t, f[2]))
     }
 
-    /// Brings the per-group depths of `sets` (bit by set) up to date.
+    /// Brings the depths of the `changed` groups up to date.
     #[inline(always)]
-    pub fn refresh<const N: usize>(&mut self, sets: u32) {
-        for q in (0..N).filter(|q| N == 1 || sets >> q & 1 != 0) {
+    pub fn refresh<const N: usize>(&mut self, changed: u64) {
+        for q in (0..N).filter(|q| N == 1 || changed >> (q * SET) & 0xffff != 0) {
             self.look_far(q);
             self.least[q] *= V::splat(self.reach);
         }
-        self.settle::<N>(sets);
+        self.settle::<N>();
     }
 
     /// How far the groups of a set look, by the ends of their rays' segments or what these found.
@@ -348,20 +355,14 @@ impl Groups {
         }
     }
 
-    /// The same, where the least reciprocals are known.
+    /// How far all groups look, where the least reciprocals are known.
     #[inline(always)]
-    fn settle<const N: usize>(&mut self, sets: u32) {
-        for q in (0..N).filter(|q| N == 1 || sets >> q & 1 != 0) {
-            let waiting = self.least[q].cmp_lt(V::splat(f32::INFINITY));
-            // A little farther than the reciprocal, whatever its rounding.
-            let far = V::splat(1.0 + 4.0 * HALF_ULP) / self.least[q];
-            self.far[q] = select(waiting, far, V::splat(f32::NEG_INFINITY));
-        }
-        let (far, near) = (1..N).fold((self.far[0], self.least[0]), |(far, near), q| {
-            (far.fast_max(self.far[q]), near.fast_min(self.least[q]))
-        });
-        self.farthest = greatest(far);
+    fn settle<const N: usize>(&mut self) {
+        let near = (1..N).fold(self.least[0], |near, q| near.fast_min(self.least[q]));
         self.nearest = least(near);
+        // A little farther than the reciprocal, whatever its rounding.
+        self.farthest =
+            if self.nearest < f32::INFINITY { (1.0 + 4.0 * HALF_ULP) / self.nearest } else { f32::NEG_INFINITY };
     }
 }
 

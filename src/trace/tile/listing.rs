@@ -1,7 +1,8 @@
 //! Which of the triangles that were set up together the groups of a tile meet: by rectangle and depth, no ray looked at.
 //!
 //! Sixteen groups at a time against one triangle, or sixteen triangles at a time against one group. Both come to the same pairs,
-//! bit by bit: a linear function is largest at one corner of a rectangle, and its roundings are monotone.
+//! bit by bit: a linear function is largest at one corner of a rectangle, and its roundings are monotone. Groups of about one size
+//! ([`super::even`]) may be listed with a few more.
 
 use super::batch::{BATCH, Planes};
 use super::groups::Groups;
@@ -9,7 +10,7 @@ use super::held::Plane;
 use super::{GROUPS, SET, SETS, V};
 use crate::lanes::chosen::lanes_of;
 use crate::lanes::marks::words_with;
-use crate::lanes::{LaneMask, Lanes, each};
+use crate::lanes::{LaneMask, Lanes, Lanes3, each};
 
 /// The pairs of a triangle and a group that meet.
 #[derive(Clone, Debug)]
@@ -59,6 +60,12 @@ pub fn groups(mut bits: u64) -> impl Iterator<Item = usize> {
             g
         })
     })
+}
+
+/// Numbers of all groups.
+#[inline(always)]
+fn of_all(sets: &[V; SETS]) -> &[f32; GROUPS] {
+    bytemuck::cast_ref(sets)
 }
 
 impl Listing {
@@ -138,34 +145,55 @@ impl Listing {
     fn group_by_group<const EXACT: bool>(
         &mut self,
         wanted: &[u64; BATCH],
-        (seen, any): (u32, u64),
+        among: (u32, u64),
         groups: &Groups,
         planes: &Planes,
     ) {
         let linear = |k: usize| each(|x| V::load(&planes.linear[k][x]));
         let linear = [linear(0), linear(1), linear(2), linear(3)];
-        let zero = V::constant(0.0);
-        // Of each product with an end of the rectangle one is zero: sums are those with the one that is greater.
-        let split = linear
-            .map(|[x, y, z]: [V; 3]| ([x.fast_max(zero), x.fast_min(zero)], [y.fast_max(zero), y.fast_min(zero)], z));
+        if let Some(even) = groups.even.as_ref().filter(|_| !EXACT) {
+            let raised = linear.map(|f: Lanes3<V>| even.raised(f));
+            let [mid_s, mid_t] = even.middle.each_ref().map(of_all);
+            self.largest_met::<EXACT>(wanted, among, groups, planes, |k, g| {
+                let [x, y, z] = raised[k];
+                x.mul_add(V::splat(mid_s[g]), y.mul_add(V::splat(mid_t[g]), z))
+            });
+        } else {
+            // Of each product with an end of the rectangle one is zero: sums are those with the one that is greater.
+            let zero = V::constant(0.0);
+            let split = linear.map(|[x, y, z]: [V; 3]| {
+                ([x.fast_max(zero), x.fast_min(zero)], [y.fast_max(zero), y.fast_min(zero)], z)
+            });
+            let [[low_s, high_s], [low_t, high_t]] = groups.rect.each_ref().map(|ends| ends.each_ref().map(of_all));
+            self.largest_met::<EXACT>(wanted, among, groups, planes, |k, g| {
+                let ([x1, x0], [y1, y0], z) = split[k];
+                let (s0, s1, t0, t1) = (low_s[g], high_s[g], low_t[g], high_t[g]);
+                let along_t = y1.mul_add(V::splat(t1), y0.mul_add(V::splat(t0), z));
+                x1.mul_add(V::splat(s1), x0.mul_add(V::splat(s0), along_t))
+            });
+        }
+    }
+
+    /// The same; `largest`: the greatest value of linear function `k` over group `g`.
+    #[inline(always)]
+    fn largest_met<const EXACT: bool>(
+        &mut self,
+        wanted: &[u64; BATCH],
+        (seen, any): (u32, u64),
+        groups: &Groups,
+        planes: &Planes,
+        largest: impl Fn(usize, usize) -> V,
+    ) {
         let (outside, most) = (V::load(&planes.outside), V::load(&planes.most));
         let (nearest, farthest) = (V::load(&planes.nearest), V::load(&planes.farthest));
         let wild = if EXACT { 0 } else { planes.wild };
-        let of_all = |sets| bytemuck::cast_ref::<[V; SETS], [f32; GROUPS]>(sets);
-        let [[low_s, high_s], [low_t, high_t]] = &groups.rect;
-        let (low_s, high_s, low_t, high_t) = (of_all(low_s), of_all(high_s), of_all(low_t), of_all(high_t));
         let least = of_all(&groups.least);
         let mut rest = any;
         while rest != 0 {
             let g = rest.trailing_zeros() as usize & (GROUPS - 1);
             rest &= rest - 1;
-            let (s0, s1, t0, t1) = (V::splat(low_s[g]), V::splat(high_s[g]), V::splat(low_t[g]), V::splat(high_t[g]));
-            let largest = |k: usize| {
-                let ([x1, x0], [y1, y0], z) = split[k];
-                x1.mul_add(s1, x0.mul_add(s0, y1.mul_add(t1, y0.mul_add(t0, z))))
-            };
-            let edge = largest(0).fast_min(largest(1)).fast_min(largest(2));
-            let inverse = largest(3);
+            let edge = largest(0, g).fast_min(largest(1, g)).fast_min(largest(2, g));
+            let inverse = largest(3, g);
             let inverse = if EXACT { inverse * most } else { nearest.fast_min(farthest.fast_max(inverse)) };
             let met = outside.cmp_le(edge) & V::splat(least[g]).cmp_le(inverse);
             let met = (met.bits() | wild) & seen & words_with(wanted, 1 << g);

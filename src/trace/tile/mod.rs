@@ -22,9 +22,11 @@ mod dead;
 mod density;
 mod edges;
 mod engine;
+mod even;
 mod exact;
 mod fine;
 mod frame;
+mod full;
 mod groups;
 mod held;
 mod lines;
@@ -39,6 +41,7 @@ mod shapes;
 mod slab;
 mod spans;
 mod walk;
+mod written;
 
 use super::output::Output;
 use super::query::{Query, Stack};
@@ -48,7 +51,6 @@ use crate::ray::{Counters, HitPacket, Packet, Rays};
 use crate::scene::world::{Object, World};
 use bundle::{Bundle, Shared};
 use columns::{AHEAD, Next};
-use engine::MANY;
 use exact::Exact;
 use presumed::First;
 
@@ -99,6 +101,7 @@ pub struct Memory {
     apart: Vec<usize>,
     /// Single rays that are.
     left: mirror::Left,
+    written: written::Written,
 }
 
 /// The engine; `EXACT`: with the hits of the common formula.
@@ -169,7 +172,8 @@ impl<'a> Job<'a> {
         stack.reserve(world.stack_bound());
         memory.stack.reserve(world.stack_bound());
         memory.visitors.reserve(world.stack_bound());
-        Self { world, rays, memory, stack, stream, counters, output, most, past: rays.len() > MANY }
+        let past = memory.written.past(rays.len(), &output);
+        Self { world, rays, memory, stack, stream, counters, output, most, past }
     }
 
     fn run<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self) {
@@ -231,6 +235,7 @@ impl<'a> Job<'a> {
         self.memory.rest = self.streamed::<ANY, EXACT, COUNT>(rest, false);
         let apart = std::mem::take(&mut self.memory.apart);
         self.memory.apart = self.streamed::<ANY, EXACT, COUNT>(apart, true);
+        self.end();
     }
 
     /// Traces the groups that start at `starts` by the stream kernel; returns the list, empty. `apart`: see [`stream::Job`].
@@ -254,14 +259,6 @@ impl<'a> Job<'a> {
         match bundle.len <= SET {
             true => self.tile::<1, ANY, EXACT, COUNT>(bundle, groups),
             false => self.tile::<SETS, ANY, EXACT, COUNT>(bundle, groups),
-        }
-    }
-
-    fn make_levels(&mut self) {
-        let below = self.world.objects.iter().map(|object| node::levels(&object.tree)).max().unwrap_or(0);
-        let depth = node::levels(&self.world.top) + below + 1;
-        if self.memory.levels.len() < depth {
-            self.memory.levels.resize(depth, node::Level::default());
         }
     }
 

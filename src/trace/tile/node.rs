@@ -10,7 +10,7 @@
 use super::frame::Frame;
 use super::groups::Groups;
 use super::spans::{Spans, groups_of};
-use super::{SET, V};
+use super::{HALF_ULP, SET, V};
 use crate::bvh::{Node, Nodes, Tree};
 use crate::lanes::words::{signs, upper_halves, without_key};
 use crate::lanes::{LaneMask, Lanes, Real, each, map3};
@@ -170,7 +170,7 @@ impl Planes {
             low.store(&mut sides.low[family]);
             (high - low).store(&mut sides.step[family]);
         }
-        near.store(&mut level.near);
+        near.fast_max(zero).store(&mut level.near);
         let of_sets = self.spans.met::<N>(&lo, &hi);
         let (mut rest, mut kept) = (met, 0);
         while rest != 0 {
@@ -209,8 +209,10 @@ impl Level {
     /// Groups of the first `N` sets that look as far as the box of `child`.
     #[inline(always)]
     fn within_reach<const N: usize>(&self, child: usize, tile: &Groups) -> u64 {
-        let near = V::splat(self.near[child]);
-        (0..N).fold(0, |met, q| met | u64::from(near.cmp_le(tile.far[q]).bits()) << (q * SET))
+        // A little nearer, whatever rounds; those that want nothing any more have infinity, and zero times that is no number.
+        let near = V::splat(self.near[child] * (1.0 - 4.0 * HALF_ULP));
+        let one = V::constant(1.0);
+        (0..N).fold(0, |met, q| met | u64::from((near * tile.least[q]).cmp_le(one).bits()) << (q * SET))
     }
 
     /// Groups of the first `N` sets that meet the box of `child`.

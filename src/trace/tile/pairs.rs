@@ -7,7 +7,7 @@ use super::groups::Groups;
 use super::held::{Held, Line, Plane};
 use super::listing::{self, triangles};
 use super::own::{self, Id, may_be_inside, pair_doubtful};
-use super::{GROUPS, Mask, Memory, SET, SETS, V};
+use super::{GROUPS, Mask, Memory, V};
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::Counters;
 
@@ -38,8 +38,8 @@ impl Again {
 struct Tested {
     /// Pairs that gave something.
     found: usize,
-    /// Sets in which some did, as bits.
-    sets: u32,
+    /// Groups in which some did, as bits.
+    groups: u64,
 }
 
 impl Tested {
@@ -47,14 +47,14 @@ impl Tested {
     #[inline(always)]
     fn find(&mut self, g: usize, count: u32) {
         self.found += count as usize;
-        self.sets |= u32::from(count != 0) << (g / SET);
+        self.groups |= u64::from(count != 0) << g;
     }
 
     /// One pair of each of some groups gave something.
     #[inline(always)]
     fn find_all(&mut self, groups: u64) {
         self.found += groups.count_ones() as usize;
-        (0..SETS).for_each(|q| self.sets |= u32::from(groups >> (q * SET) & 0xffff != 0) << q);
+        self.groups |= groups;
     }
 }
 
@@ -70,7 +70,7 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     listing.fill::<N, EXACT>(seen, &batch.groups, groups, planes);
     let to_end = ANY && matches!(exact.bundle.shared, Shared::End(_));
     let is_behind = !ANY && groups.is_behind;
-    let Tested { found, sets } = match (EXACT, is_behind) {
+    let Tested { found, groups: changed } = match (EXACT, is_behind) {
         (true, true) => test_exact::<ANY, true, COUNT>(memory, exact, counters),
         (true, false) => test_exact::<ANY, false, COUNT>(memory, exact, counters),
         (false, true) if groups.many => test::<ANY, true, true, false, false, COUNT>(memory, exact, counters),
@@ -88,8 +88,8 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     };
     memory.batch.clear();
     memory.slabs.learn(memory.listing.pairs, found);
-    if sets != 0 {
-        memory.groups.refresh::<N>(sets);
+    if changed != 0 {
+        memory.groups.refresh::<N>(changed);
     }
 }
 
@@ -181,7 +181,7 @@ fn test<
             let (g, i) = (g & (GROUPS - 1), i & (BATCH - 1));
             if unsteady >> i & 1 != 0 || is_doubtful::<ANY, MANY, BEHIND, END, EARLY>(groups, planes, g, i, id(i)) {
                 let found = pair_doubtful::<ANY, MANY>(groups, planes, g, i, id(i), END);
-                tested.sets |= u32::from(found) << (g / SET);
+                tested.groups |= u64::from(found) << g;
             }
         }
     }

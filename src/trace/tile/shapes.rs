@@ -6,7 +6,7 @@ use super::columns::Segments;
 use super::exact::Exact;
 use super::groups::Groups;
 use super::own::{Id, occlude};
-use super::{GROUPS, Mask, SET, V, select};
+use super::{GROUPS, Mask, V, select};
 use crate::bvh::Child;
 use crate::lanes::chosen::{merge, merge_lists};
 use crate::lanes::words::positions;
@@ -67,7 +67,7 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
             true => occlude(groups, g, Mask::from_bits(done)),
             false => take(groups, g, &hit, inst),
         };
-        touched |= u32::from(found) << (g / SET);
+        touched |= u64::from(found) << g;
     }
     if touched != 0 {
         groups.refresh::<N>(touched);
