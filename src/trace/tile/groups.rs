@@ -179,9 +179,10 @@ impl Groups {
             Source::Pencil(..) => None,
         };
         let from = bundle.first / V::N;
-        let full = !EXACT && self.fill::<N>(bundle);
+        let all = u64::MAX >> (GROUPS - N * SET);
+        let full = !EXACT && groups == all && self.fill::<N>(bundle);
         if full {
-            whole = u64::MAX >> (GROUPS - N * SET);
+            whole = all;
         } else {
             for q in 0..N {
                 for i in 0..SET {
@@ -272,7 +273,7 @@ impl Groups {
                 }
             }
         }
-        self.endless = whole == u64::MAX >> (GROUPS - N * SET);
+        self.endless = whole == all;
         self.ends_early = least(near) < f32::INFINITY;
         if self.ends_early && !EXACT {
             listing::groups(whole).for_each(|g| self.of[g].inv_hi = most);
