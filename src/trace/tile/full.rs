@@ -143,8 +143,9 @@ mod tests {
     #[test]
     fn one_other_ray_is_enough() {
         type Change = fn(&mut Rays<f32>, usize);
-        let changes: [Change; 12] = [
+        let changes: [Change; 13] = [
             |rays, i| rays.org[0][i] = POINT[0].next_up(),
+            |rays, i| rays.org[1][i] = POINT[1].next_down(),
             |rays, i| rays.org[2][i] = -POINT[2],
             |rays, i| rays.t_min[i] = f32::MIN_POSITIVE,
             |rays, i| rays.t_min[i] = -1.0,
