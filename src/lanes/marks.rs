@@ -1,7 +1,8 @@
 //! Words that are sets of bits, several in a vector: what may be with which.
-#![allow(unsafe_code, reason = "instructions no crate offers as safe functions")]
 
 use wide::u64x8;
+
+use super::{LaneMask, Lanes, MAX_LANES, Real};
 
 /// Words that have some of the set bits of `bits`, as bits.
 #[inline(always)]
@@ -11,72 +12,54 @@ pub fn words_with(words: &[u64; 16], bits: u64) -> u32 {
     has(low) | has(high) << 8
 }
 
-/// `N` words of 64 bits, eight or sixteen.
+/// A word of 64 bits for each of `E`'s lanes, and which lanes have any bit set.
 #[derive(Clone, Copy, Debug)]
-pub struct Marks<const N: usize>([u64x8; 2]);
+pub struct Marks<E: Lanes> {
+    marked: E::Mask,
+    /// In the lanes' own bits; the second vector has the upper halves where a lane has 32.
+    words: [E; 2],
+}
 
-impl<const N: usize> Marks<N> {
+impl<E: Lanes> Marks<E> {
     /// No bit set.
     #[inline(always)]
     pub fn none() -> Self {
-        Self([u64x8::splat(0); 2])
+        Self { marked: E::Mask::from_bits(0), words: [E::splat(E::Scalar::ZERO); 2] }
     }
 
-    /// Sets bit `bit` in the words whose bit is set in `words`.
+    /// Sets bit `bit`, below 64, in the words whose lane is set in `lanes`.
     #[inline(always)]
     #[must_use]
-    pub fn with(self, words: u32, bit: u32) -> Self {
-        let Self([low, high]) = self;
-        Self([with(low, words, bit), if N > 8 { with(high, words >> 8, bit) } else { high }])
+    pub fn with(self, lanes: E::Mask, bit: usize) -> Self {
+        let Self { marked, words: [low, high] } = self;
+        let bits = E::Scalar::marks(bit);
+        let words = [low.with_bits(lanes, E::splat(bits[0])), high.with_bits(lanes, E::splat(bits[1]))];
+        Self { marked: marked | lanes, words }
     }
 
-    /// Words that are not zero, as bits.
+    /// Lanes with some bit set, as bits.
     #[inline(always)]
-    pub fn not_zero(self) -> u32 {
-        let not_zero = |words: u64x8| !words.simd_eq(u64x8::splat(0)).to_bitmask() & 0xff;
-        let Self([low, high]) = self;
-        if N > 8 { not_zero(low) | not_zero(high) << 8 } else { not_zero(low) }
+    pub fn marked(self) -> u32 {
+        self.marked.bits()
     }
 
-    /// The words.
+    /// The words of the first `N` lanes.
     #[inline(always)]
-    pub fn words(self) -> [u64; N] {
+    pub fn words<const N: usize>(self) -> [u64; N] {
+        let mut halves = [[E::Scalar::ZERO; MAX_LANES]; 2];
+        let [low, high] = self.words;
+        low.store(&mut halves[0]);
+        high.store(&mut halves[1]);
         let mut words = [0; N];
-        for (to, from) in words.chunks_exact_mut(8).zip(self.0) {
-            to.copy_from_slice(&from.to_array());
-        }
+        words.iter_mut().enumerate().for_each(|(i, word)| *word = E::Scalar::word([halves[0][i], halves[1][i]]));
         words
     }
-}
-
-/// Sets bit `bit` in those of eight words whose bit is set in `wanted`.
-#[inline(always)]
-fn with(words: u64x8, wanted: u32, bit: u32) -> u64x8 {
-    #[cfg(target_feature = "avx512f")]
-    {
-        use std::arch::x86_64::{_mm512_maskz_set1_epi64, _mm512_storeu_si512};
-        let mut set = [0; 8];
-        // SAFETY: compiled only where the whole build has AVX-512F; the store fills the 64 bytes of `set`.
-        unsafe {
-            let own = _mm512_maskz_set1_epi64(wanted as u8, 1 << bit);
-            _mm512_storeu_si512(set.as_mut_ptr().cast(), own);
-        }
-        words | u64x8::new(set)
-    }
-    #[cfg(not(target_feature = "avx512f"))]
-    with_portable(words, wanted, bit)
-}
-
-#[cfg(any(test, not(target_feature = "avx512f")))]
-fn with_portable(words: u64x8, wanted: u32, bit: u32) -> u64x8 {
-    const PLACES: u64x8 = u64x8::new([1, 2, 4, 8, 16, 32, 64, 128]);
-    let wanted = (u64x8::splat(wanted.into()) & PLACES).simd_eq(PLACES);
-    words | u64x8::splat(1 << bit) & wanted
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::{Pair, f32x8, f32x16, f64x8};
 
     #[test]
     fn words_that_have_some_bit() {
@@ -91,18 +74,25 @@ mod tests {
         }
     }
 
+    fn check<E: Lanes, const N: usize>() {
+        let (mut marks, mut want) = (Marks::<E>::none(), [0u64; N]);
+        assert_eq!((marks.marked(), marks.words()), (0, want));
+        for (lanes, bit) in [(0b1010_0110u32, 63), (0xff, 0), (0, 5), (1, 40), (0xd00f, 17), (0x8000, 31), (2, 32)] {
+            let lanes = lanes & E::ALL;
+            marks = marks.with(E::Mask::from_bits(lanes), bit);
+            want.iter_mut().enumerate().for_each(|(i, word)| *word |= u64::from(lanes >> i & 1) << bit);
+            assert_eq!(marks.words(), want);
+            let marked = want.iter().rev().fold(0, |bits, &word| bits << 1 | u32::from(word != 0));
+            assert_eq!(marks.marked(), marked);
+        }
+    }
+
     #[test]
     fn marks_are_set_where_they_are_wanted() {
-        let eight = u64x8::new([0, 1, 2, 3, 4, 5, 6, 7]);
-        for (words, bit) in [(0b1010_0110, 63), (0xff, 0), (0, 5), (1, 40), (0xd00f, 17)] {
-            let want: [u64; 8] = std::array::from_fn(|i| i as u64 | u64::from(words >> i & 1) << bit);
-            assert_eq!(with_portable(eight, words, bit).to_array(), want);
-            assert_eq!(Marks::<8>([eight; 2]).with(words, bit).words(), want);
-            let want: [u64; 16] = std::array::from_fn(|i| (i % 8) as u64 | u64::from(words >> i & 1) << bit);
-            assert_eq!(Marks::<16>([eight; 2]).with(words, bit).words(), want);
-        }
-        assert_eq!((Marks::<8>([eight; 2]).not_zero(), Marks::<8>::none().not_zero()), (0xfe, 0));
-        let marks = Marks::<16>([eight, eight << 7]).with(0x100, 5);
-        assert_eq!((marks.not_zero(), Marks::<16>::none().not_zero()), (0xfffe, 0));
+        check::<f32x16, 16>();
+        check::<f32x8, 8>();
+        check::<f64x8, 8>();
+        check::<Pair<f64x8>, 16>();
+        check::<f32, 1>();
     }
 }

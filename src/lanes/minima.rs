@@ -10,7 +10,11 @@ pub fn row_minima(rows: &[f32x16; 16]) -> f32x16 {
     {
         avx512::row_minima(rows)
     }
-    #[cfg(not(target_feature = "avx512f"))]
+    #[cfg(all(target_feature = "avx2", not(target_feature = "avx512f")))]
+    {
+        avx2::row_minima(rows)
+    }
+    #[cfg(not(target_feature = "avx2"))]
     portable::row_minima(rows)
 }
 
@@ -44,7 +48,11 @@ pub fn quarters(vectors: [f32x16; 4]) -> f32x16 {
     {
         avx512::quarters(vectors)
     }
-    #[cfg(not(target_feature = "avx512f"))]
+    #[cfg(all(target_feature = "avx2", not(target_feature = "avx512f")))]
+    {
+        avx2::quarters(vectors)
+    }
+    #[cfg(not(target_feature = "avx2"))]
     portable::quarters(vectors)
 }
 
@@ -55,11 +63,15 @@ pub fn quarter_minima(rows: &[f32x16; 16]) -> [f32x16; 4] {
     {
         avx512::quarter_minima(rows)
     }
-    #[cfg(not(target_feature = "avx512f"))]
+    #[cfg(all(target_feature = "avx2", not(target_feature = "avx512f")))]
+    {
+        avx2::quarter_minima(rows)
+    }
+    #[cfg(not(target_feature = "avx2"))]
     portable::quarter_minima(rows)
 }
 
-#[cfg(any(test, not(target_feature = "avx512f")))]
+#[cfg(any(test, not(target_feature = "avx2")))]
 mod portable {
     use wide::f32x16;
 
@@ -179,6 +191,81 @@ mod avx512 {
                 store(_mm512_shuffle_f32x4::<0xdd>(high, high_2)),
             ]
         }
+    }
+}
+
+#[cfg(all(target_feature = "avx2", not(target_feature = "avx512f")))]
+mod avx2 {
+    use std::arch::x86_64::{__m256, _mm256_min_ps, _mm256_permute2f128_ps, _mm256_shuffle_ps};
+    use std::arch::x86_64::{_mm256_unpackhi_ps, _mm256_unpacklo_ps};
+    use wide::f32x16;
+
+    /// Both halves of each vector.
+    #[inline(always)]
+    fn halves(v: f32x16) -> [__m256; 2] {
+        bytemuck::cast(v.to_array())
+    }
+
+    #[inline(always)]
+    fn joined(low: __m256, high: __m256) -> f32x16 {
+        f32x16::new(bytemuck::cast([low, high]))
+    }
+
+    /// The lesser of each lane's two halves.
+    #[inline(always)]
+    fn folded(v: f32x16) -> __m256 {
+        let [low, high] = halves(v);
+        // SAFETY: compiled only where the whole build has AVX2; the instructions touch registers only. So below.
+        unsafe { _mm256_min_ps(low, high) }
+    }
+
+    /// The lower quarters of both, and the upper ones.
+    #[inline(always)]
+    fn quarters_of(a: __m256, b: __m256) -> (__m256, __m256) {
+        // SAFETY: see `folded`.
+        unsafe { (_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b)) }
+    }
+
+    /// The lesser quarter of `a`, then that of `b`.
+    #[inline(always)]
+    fn fold(a: __m256, b: __m256) -> __m256 {
+        let (low, high) = quarters_of(a, b);
+        // SAFETY: see `folded`.
+        unsafe { _mm256_min_ps(low, high) }
+    }
+
+    /// Each quarter's least values of `a`, `b`, `c`, `d`, in its lanes.
+    #[inline(always)]
+    fn within_quarters([a, b, c, d]: [__m256; 4]) -> __m256 {
+        // SAFETY: see `folded`.
+        unsafe {
+            let pairs = |a, b| _mm256_min_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+            let (a, b) = (pairs(a, b), pairs(c, d));
+            _mm256_min_ps(_mm256_shuffle_ps::<0x44>(a, b), _mm256_shuffle_ps::<0xee>(a, b))
+        }
+    }
+
+    #[inline(always)]
+    pub fn row_minima(rows: &[f32x16; 16]) -> f32x16 {
+        let four = |i: usize| within_quarters([0, 1, 2, 3].map(|k| folded(rows[i + k])));
+        joined(fold(four(0), four(4)), fold(four(8), four(12)))
+    }
+
+    #[inline(always)]
+    pub fn quarters([a, b, c, d]: [f32x16; 4]) -> f32x16 {
+        joined(fold(folded(a), folded(b)), fold(folded(c), folded(d)))
+    }
+
+    #[inline(always)]
+    pub fn quarter_minima(rows: &[f32x16; 16]) -> [f32x16; 4] {
+        let four = |i: usize, half: usize| within_quarters([0, 1, 2, 3].map(|k| halves(rows[i + k])[half]));
+        let of = |half: usize| {
+            let (a, b) = quarters_of(four(0, half), four(4, half));
+            let (c, d) = quarters_of(four(8, half), four(12, half));
+            [joined(a, c), joined(b, d)]
+        };
+        let ([a, b], [c, d]) = (of(0), of(1));
+        [a, b, c, d]
     }
 }
 

@@ -81,6 +81,8 @@ pub trait Lanes:
     fn lane(self, i: usize) -> Self::Scalar;
     /// `if_true` where the mask is set.
     fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self;
+    /// `self` where the mask is set, zero elsewhere.
+    fn kept(self, mask: Self::Mask) -> Self;
     /// `if self < other { self } else { other }`.
     fn fast_min(self, other: Self) -> Self;
     /// `if self > other { self } else { other }`.
@@ -91,6 +93,8 @@ pub trait Lanes:
     fn abs(self) -> Self;
     /// Square root; NaN for negative numbers.
     fn sqrt(self) -> Self;
+    /// With the bits of `bits` set, too, where the mask is set.
+    fn with_bits(self, mask: Self::Mask, bits: Self) -> Self;
     /// `self < other`, false for NaN.
     fn cmp_lt(self, other: Self) -> Self::Mask;
     /// `self <= other`, false for NaN.
@@ -186,6 +190,10 @@ pub trait Real:
     fn next_down(self) -> Self;
     /// The smallest number above a finite `self`.
     fn next_up(self) -> Self;
+    /// Bit `bit`, below 64, in the bits of one or two scalars: the lower half of a word and the upper one where a scalar has 32.
+    fn marks(bit: usize) -> [Self; 2];
+    /// The word of 64 bits that is made of two scalars' bits.
+    fn word(halves: [Self; 2]) -> u64;
     /// Rows and columns swapped.
     #[inline(always)]
     fn transposed(block: &[[Self; rows::ROW]; rows::ROW]) -> [[Self; rows::ROW]; rows::ROW] {

@@ -21,7 +21,11 @@ pub fn packed_floats(v: f32x16, bits: u32) -> f32x16 {
         }
         f32x16::new(front)
     }
-    #[cfg(not(target_feature = "avx512f"))]
+    #[cfg(all(target_feature = "avx2", not(target_feature = "avx512f")))]
+    {
+        avx2::packed(v, bits)
+    }
+    #[cfg(not(target_feature = "avx2"))]
     f32x16::new(packed(v.to_array(), bits))
 }
 
@@ -59,7 +63,11 @@ pub fn near_floats(from: &[f32; 32], at: &[u32; MAX_LANES]) -> f32x16 {
         }
         f32x16::new(found)
     }
-    #[cfg(not(target_feature = "avx512f"))]
+    #[cfg(all(target_feature = "avx2", not(target_feature = "avx512f")))]
+    {
+        avx2::near(from, at)
+    }
+    #[cfg(not(target_feature = "avx2"))]
     f32x16::new(near(from, at))
 }
 
@@ -99,6 +107,86 @@ fn near<S: Copy + Default, const N: usize, const M: usize>(from: &[S; M], at: &[
     let mut to = [S::default(); N];
     to.iter_mut().zip(at).for_each(|(to, &at)| *to = from[at as usize % M]);
     to
+}
+
+#[cfg(all(target_feature = "avx2", not(target_feature = "avx512f")))]
+mod avx2 {
+    use std::arch::x86_64::{__m128i, __m256, __m256i, _mm256_and_ps, _mm256_blendv_ps, _mm256_castsi256_ps};
+    use std::arch::x86_64::{_mm256_cmpgt_epi32, _mm256_cvtepu8_epi32, _mm256_permutevar8x32_ps, _mm256_set1_epi32};
+    use std::arch::x86_64::{_mm256_slli_epi32, _mm256_sub_epi32};
+    use wide::f32x16;
+
+    use crate::lanes::MAX_LANES;
+
+    /// The numbers of the set bits of each byte, in order.
+    static NUMBERS: [[u8; 8]; 256] = {
+        let (mut all, mut bits) = ([[0; 8]; 256], 0);
+        while bits < 256 {
+            let (mut count, mut bit) = (0, 0);
+            while bit < 8 {
+                if bits >> bit & 1 != 0 {
+                    all[bits][count] = bit as u8;
+                    count += 1;
+                }
+                bit += 1;
+            }
+            bits += 1;
+        }
+        all
+    };
+
+    const PLACES: [u32; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
+
+    /// Where in each half the lanes to be moved are.
+    #[inline(always)]
+    fn numbers(bits: u32) -> __m256i {
+        let [low, high]: [u64; 2] = [bytemuck::cast(NUMBERS[bits as usize & 0xff]), 0];
+        // SAFETY: compiled only where the whole build has AVX2; the instructions touch registers only. So below.
+        unsafe { _mm256_cvtepu8_epi32(bytemuck::cast::<[u64; 2], __m128i>([low, high])) }
+    }
+
+    /// The first `count` lanes, as a mask.
+    #[inline(always)]
+    fn first(count: i32) -> __m256 {
+        // SAFETY: see `numbers`.
+        unsafe { _mm256_castsi256_ps(_mm256_cmpgt_epi32(_mm256_set1_epi32(count), bytemuck::cast(PLACES))) }
+    }
+
+    #[inline(always)]
+    pub fn packed(v: f32x16, bits: u32) -> f32x16 {
+        let [low, high]: [__m256; 2] = bytemuck::cast(v.to_array());
+        let (in_low, in_high) = ((bits & 0xff).count_ones() as i32, (bits >> 8 & 0xff).count_ones() as i32);
+        // SAFETY: see `numbers`.
+        let both: [__m256; 2] = unsafe {
+            let low = _mm256_permutevar8x32_ps(low, numbers(bits));
+            let high = _mm256_permutevar8x32_ps(high, numbers(bits >> 8));
+            // Behind those of the lower half; what does not fit comes to the front of the next vector.
+            let behind = _mm256_sub_epi32(bytemuck::cast(PLACES), _mm256_set1_epi32(in_low));
+            let high = _mm256_permutevar8x32_ps(high, behind);
+            [
+                _mm256_and_ps(_mm256_blendv_ps(high, low, first(in_low)), first(in_low + in_high)),
+                _mm256_and_ps(high, first(in_low + in_high - 8)),
+            ]
+        };
+        f32x16::new(bytemuck::cast(both))
+    }
+
+    #[inline(always)]
+    pub fn near(from: &[f32; 32], at: &[u32; MAX_LANES]) -> f32x16 {
+        let from: [__m256; 4] = bytemuck::cast(*from);
+        let at: [__m256i; 2] = bytemuck::cast(*at);
+        let half = |at: __m256i| {
+            // SAFETY: see `numbers`. Of a place a permutation takes the lowest three bits; the fourth and the fifth choose between
+            // vectors, as signs.
+            unsafe {
+                let [a, b, c, d] = from.map(|from| _mm256_permutevar8x32_ps(from, at));
+                let fourth = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(at));
+                let (low, high) = (_mm256_blendv_ps(a, b, fourth), _mm256_blendv_ps(c, d, fourth));
+                _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32::<27>(at)))
+            }
+        };
+        f32x16::new(bytemuck::cast([half(at[0]), half(at[1])]))
+    }
 }
 
 #[cfg(test)]

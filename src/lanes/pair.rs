@@ -101,6 +101,10 @@ macro_rules! pair_lanes {
                 Self(Lanes::select(mask.0, if_true.0, if_false.0), Lanes::select(mask.1, if_true.1, if_false.1))
             }
             #[inline(always)]
+            fn kept(self, mask: Self::Mask) -> Self {
+                Self(Lanes::kept(self.0, mask.0), Lanes::kept(self.1, mask.1))
+            }
+            #[inline(always)]
             fn fast_min(self, other: Self) -> Self {
                 Self(Lanes::fast_min(self.0, other.0), Lanes::fast_min(self.1, other.1))
             }
@@ -119,6 +123,10 @@ macro_rules! pair_lanes {
             #[inline(always)]
             fn sqrt(self) -> Self {
                 Self(Lanes::sqrt(self.0), Lanes::sqrt(self.1))
+            }
+            #[inline(always)]
+            fn with_bits(self, mask: Self::Mask, bits: Self) -> Self {
+                Self(Lanes::with_bits(self.0, mask.0, bits.0), Lanes::with_bits(self.1, mask.1, bits.1))
             }
             #[inline(always)]
             fn cmp_lt(self, other: Self) -> Self::Mask {

@@ -18,7 +18,7 @@ impl LaneMask for bool {
 }
 
 macro_rules! scalar_lanes {
-    ($t:ident, $octo:ident, $wide:ident, $children:ident $(, $transposed:path)?) => {
+    ($t:ident, $octo:ident, $wide:ident, $children:ident, $marks:path, $word:path $(, $transposed:path)?) => {
         impl Lanes for $t {
             type Scalar = $t;
             type Mask = bool;
@@ -45,6 +45,10 @@ macro_rules! scalar_lanes {
                 if mask { if_true } else { if_false }
             }
             #[inline(always)]
+            fn kept(self, mask: bool) -> Self {
+                if mask { self } else { 0.0 }
+            }
+            #[inline(always)]
             fn fast_min(self, other: Self) -> Self {
                 if self < other { self } else { other }
             }
@@ -69,6 +73,10 @@ macro_rules! scalar_lanes {
             #[inline(always)]
             fn sqrt(self) -> Self {
                 $t::sqrt(self)
+            }
+            #[inline(always)]
+            fn with_bits(self, mask: bool, bits: Self) -> Self {
+                $t::from_bits(if mask { self.to_bits() | bits.to_bits() } else { self.to_bits() })
             }
             #[inline(always)]
             fn cmp_lt(self, other: Self) -> bool {
@@ -113,6 +121,16 @@ macro_rules! scalar_lanes {
             fn next_up(self) -> Self {
                 $t::next_up(self)
             }
+            #[inline(always)]
+            fn marks(bit: usize) -> [Self; 2] {
+                // A table: a vector of one number is read faster than made of a register's.
+                static MARKS: [[$t; 2]; 64] = $marks();
+                MARKS[bit % 64]
+            }
+            #[inline(always)]
+            fn word(halves: [Self; 2]) -> u64 {
+                $word(halves)
+            }
             $(
                 #[inline(always)]
                 fn transposed(block: &[[Self; rows::ROW]; rows::ROW]) -> [[Self; rows::ROW]; rows::ROW] {
@@ -123,8 +141,36 @@ macro_rules! scalar_lanes {
     };
 }
 
+const fn marks32() -> [[f32; 2]; 64] {
+    let (mut marks, mut bit) = ([[0.0; 2]; 64], 0);
+    while bit < 64 {
+        marks[bit][bit / 32] = f32::from_bits(1 << (bit % 32));
+        bit += 1;
+    }
+    marks
+}
+
+const fn marks64() -> [[f64; 2]; 64] {
+    let (mut marks, mut bit) = ([[0.0; 2]; 64], 0);
+    while bit < 64 {
+        marks[bit][0] = f64::from_bits(1 << bit);
+        bit += 1;
+    }
+    marks
+}
+
+#[inline(always)]
+fn word32([low, high]: [f32; 2]) -> u64 {
+    u64::from(low.to_bits()) | u64::from(high.to_bits()) << 32
+}
+
+#[inline(always)]
+fn word64([word, _]: [f64; 2]) -> u64 {
+    word.to_bits()
+}
+
 #[cfg(target_feature = "avx512f")]
-scalar_lanes!(f32, f32x8, f32x16, f32x16, rows::transposed_floats);
+scalar_lanes!(f32, f32x8, f32x16, f32x16, marks32, word32, rows::transposed_floats);
 #[cfg(not(target_feature = "avx512f"))]
-scalar_lanes!(f32, f32x8, f32x16, f32x8, rows::transposed_floats);
-scalar_lanes!(f64, f64x8, f64x8, f64x8);
+scalar_lanes!(f32, f32x8, f32x16, f32x8, marks32, word32, rows::transposed_floats);
+scalar_lanes!(f64, f64x8, f64x8, f64x8, marks64, word64);

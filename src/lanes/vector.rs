@@ -1,4 +1,5 @@
 //! The vectors of `wide` as [`Lanes`].
+#![allow(unsafe_code, reason = "what the compiler makes of a choice that is stored")]
 
 use bytemuck::cast;
 use wide::{f32x4, f32x8, f32x16, f64x2, f64x4, f64x8};
@@ -9,6 +10,39 @@ use super::{LaneMask, Lanes};
 /// A full-width mask in registers (all bits of a lane set or clear). AVX-512 builds keep it in a mask register.
 #[derive(Clone, Copy, Debug)]
 pub struct VectorMask<V>(V);
+
+/// `v`, in a way that hides from the compiler where it comes from.
+///
+/// A choice between a number and what memory holds that is stored there again becomes a store under a mask otherwise, which takes AMD's
+/// CPUs up to dozens of cycles where masks are vectors; choosing and storing takes two.
+#[inline(always)]
+fn hidden<V: bytemuck::Pod>(v: V) -> V {
+    #[cfg(all(target_feature = "avx", not(target_feature = "avx512f"), not(miri)))]
+    {
+        use std::arch::asm;
+        use std::arch::x86_64::{__m128, __m256};
+        let one = |mut v: __m256| {
+            // SAFETY: no instruction at all; compiled only where the whole build has AVX and with it the register.
+            unsafe { asm!("/* {0} */", inout(ymm_reg) v, options(pure, nomem, nostack, preserves_flags)) };
+            v
+        };
+        match size_of::<V>() {
+            16 => {
+                let mut v: __m128 = cast(v);
+                // SAFETY: as above.
+                unsafe { asm!("/* {0} */", inout(xmm_reg) v, options(pure, nomem, nostack, preserves_flags)) };
+                return cast(v);
+            }
+            32 => return cast(one(cast(v))),
+            64 => {
+                let [low, high]: [__m256; 2] = cast(v);
+                return cast([one(low), one(high)]);
+            }
+            _ => {}
+        }
+    }
+    v
+}
 
 macro_rules! vector_lanes {
     ($v:ident, $s:ident, $n:literal, $int:ident, $bits:expr $(, $packed:path, $near:path)?) => {
@@ -75,7 +109,11 @@ macro_rules! vector_lanes {
             }
             #[inline(always)]
             fn select(mask: Self::Mask, if_true: Self, if_false: Self) -> Self {
-                mask.0.select(if_true, if_false)
+                hidden(mask.0.select(if_true, if_false))
+            }
+            #[inline(always)]
+            fn kept(self, mask: Self::Mask) -> Self {
+                if cfg!(target_feature = "avx512f") { mask.0.select(self, Self::splat(0.0)) } else { self & mask.0 }
             }
             #[inline(always)]
             fn fast_min(self, other: Self) -> Self {
@@ -96,6 +134,11 @@ macro_rules! vector_lanes {
             #[inline(always)]
             fn sqrt(self) -> Self {
                 $v::sqrt(self)
+            }
+            #[inline(always)]
+            fn with_bits(self, mask: Self::Mask, bits: Self) -> Self {
+                // One instruction with mask registers, two without.
+                if cfg!(target_feature = "avx512f") { mask.0.select(self | bits, self) } else { self | mask.0 & bits }
             }
             #[inline(always)]
             fn cmp_lt(self, other: Self) -> Self::Mask {

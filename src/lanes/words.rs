@@ -4,7 +4,7 @@
 #![allow(unsafe_code, reason = "instructions no crate offers as safe functions")]
 
 use super::{LaneMask, Lanes};
-use wide::{f32x4, f32x8, f32x16, u16x8, u32x16};
+use wide::{f32x4, f32x8, f32x16, u8x16, u16x8, u32x16};
 
 /// The lower and the upper half.
 #[inline(always)]
@@ -213,10 +213,23 @@ pub fn transpose_bits<const K: usize>(planes: [u32; K]) -> [u8; 16] {
         bytemuck::cast(all)
     }
     #[cfg(not(all(target_feature = "avx512bw", target_feature = "avx512vl")))]
-    transpose_bits_portable(planes)
+    transpose_bits_by_bytes(planes)
 }
 
+/// One plane after the other, in all bytes at once.
 #[cfg(any(test, not(all(target_feature = "avx512bw", target_feature = "avx512vl"))))]
+#[inline(always)]
+fn transpose_bits_by_bytes<const K: usize>(planes: [u32; K]) -> [u8; 16] {
+    const PLACES: u8x16 = u8x16::new([1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128]);
+    let eight = |byte: u32| u64::from(byte & 0xff) * 0x0101_0101_0101_0101;
+    let numbers = planes.iter().enumerate().fold(u8x16::ZERO, |all, (k, &plane)| {
+        let own = u8x16::new(bytemuck::cast([eight(plane), eight(plane >> 8)]));
+        all | (own & PLACES).simd_eq(PLACES) & u8x16::splat(1 << k)
+    });
+    numbers.to_array()
+}
+
+#[cfg(test)]
 fn transpose_bits_portable<const K: usize>(planes: [u32; K]) -> [u8; 16] {
     std::array::from_fn(|i| planes.iter().enumerate().fold(0, |all, (k, plane)| all | ((plane >> i & 1) << k) as u8))
 }
@@ -272,6 +285,7 @@ mod tests {
             let planes: [u32; 5] = std::array::from_fn(|_| next());
             let got = transpose_bits(planes);
             assert_eq!(got, transpose_bits_portable(planes));
+            assert_eq!(got, transpose_bits_by_bytes(planes));
             for (i, number) in got.into_iter().enumerate() {
                 let want: String = (0..5).rev().map(|k| if planes[k] >> i & 1 != 0 { '1' } else { '0' }).collect();
                 assert_eq!(format!("{number:05b}"), want);

@@ -96,18 +96,18 @@ pub fn one_by_one<E: Lanes, const W: usize, const ANY: bool>(
     rays: Set,
     test: impl Fn(usize) -> (E::Mask, E),
 ) -> Met<E::Scalar, W> {
-    let mut marks = [Marks::<W>::none(); 2];
+    let mut marks = [Marks::<E>::none(); 2];
     let mut first = E::splat(E::Scalar::INFINITY);
     for (half, marks) in marks.iter_mut().enumerate() {
         let mut rest = (rays >> (64 * half)) as u64;
         while rest != 0 {
-            let i = rest.trailing_zeros();
+            let i = rest.trailing_zeros() as usize;
             rest &= rest - 1;
-            let (meets, near) = test((64 * half + i as usize) & (RAYS - 1));
+            let (meets, near) = test((64 * half + i) & (RAYS - 1));
             if !ANY {
                 first = E::select(meets, near.fast_min(first), first);
             }
-            *marks = marks.with(meets.bits(), i);
+            *marks = marks.with(meets, i);
         }
     }
     let mut near = [E::Scalar::ZERO; W];
@@ -116,7 +116,7 @@ pub fn one_by_one<E: Lanes, const W: usize, const ANY: bool>(
     }
     // Slots without a child are empty boxes, which no ray of an octant meets.
     let [low, high] = marks;
-    Met { children: low.not_zero() | high.not_zero(), halves: [low.words(), high.words()], near, bound: true }
+    Met { children: low.marked() | high.marked(), halves: [low.words(), high.words()], near, bound: true }
 }
 
 /// The near and far planes of a node's boxes, axis by axis.

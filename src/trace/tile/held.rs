@@ -39,7 +39,7 @@ fn raised(best: V, lanes: Mask, found: V) -> V {
     // Where a comparison is a register of its own one operation does it; else clearing costs less than choosing.
     match cfg!(target_feature = "avx512f") {
         true => select(lanes, found.fast_max(best), best),
-        false => select(lanes, found, V::constant(0.0)).fast_max(best),
+        false => found.kept(lanes).fast_max(best),
     }
 }
 
