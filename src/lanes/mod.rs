@@ -91,6 +91,8 @@ pub trait Lanes:
     fn mul_add(self, b: Self, c: Self) -> Self;
     /// Absolute value.
     fn abs(self) -> Self;
+    /// Negated where the sign bit of `sign` is set.
+    fn turned_as(self, sign: Self) -> Self;
     /// Square root; NaN for negative numbers.
     fn sqrt(self) -> Self;
     /// With the bits of `bits` set, too, where the mask is set.
@@ -194,6 +196,11 @@ pub trait Real:
     fn marks(bit: usize) -> [Self; 2];
     /// The word of 64 bits that is made of two scalars' bits.
     fn word(halves: [Self; 2]) -> u64;
+    /// Which of 64 numbers `self` does not exceed, as bits.
+    #[inline(always)]
+    fn reached(self, of: &[Self; 64]) -> u64 {
+        words::reached_by_vectors(self, of)
+    }
     /// Rows and columns swapped.
     #[inline(always)]
     fn transposed(block: &[[Self; rows::ROW]; rows::ROW]) -> [[Self; rows::ROW]; rows::ROW] {

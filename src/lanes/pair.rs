@@ -125,6 +125,10 @@ macro_rules! pair_lanes {
                 Self(Lanes::sqrt(self.0), Lanes::sqrt(self.1))
             }
             #[inline(always)]
+            fn turned_as(self, sign: Self) -> Self {
+                Self(Lanes::turned_as(self.0, sign.0), Lanes::turned_as(self.1, sign.1))
+            }
+            #[inline(always)]
             fn with_bits(self, mask: Self::Mask, bits: Self) -> Self {
                 Self(Lanes::with_bits(self.0, mask.0, bits.0), Lanes::with_bits(self.1, mask.1, bits.1))
             }

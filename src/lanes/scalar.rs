@@ -1,6 +1,6 @@
 //! Width 1: the scalars themselves.
 
-use super::{LaneMask, Lanes, Real, rows};
+use super::{LaneMask, Lanes, Real, rows, words};
 
 impl LaneMask for bool {
     #[inline(always)]
@@ -18,7 +18,7 @@ impl LaneMask for bool {
 }
 
 macro_rules! scalar_lanes {
-    ($t:ident, $octo:ident, $wide:ident, $children:ident, $marks:path, $word:path $(, $transposed:path)?) => {
+    ($t:ident, $octo:ident, $wide:ident, $children:ident, $marks:path, $word:path $(, $transposed:path, $reached:path)?) => {
         impl Lanes for $t {
             type Scalar = $t;
             type Mask = bool;
@@ -75,6 +75,10 @@ macro_rules! scalar_lanes {
                 $t::sqrt(self)
             }
             #[inline(always)]
+            fn turned_as(self, sign: Self) -> Self {
+                $t::from_bits(self.to_bits() ^ sign.to_bits() & (-0.0 as $t).to_bits())
+            }
+            #[inline(always)]
             fn with_bits(self, mask: bool, bits: Self) -> Self {
                 $t::from_bits(if mask { self.to_bits() | bits.to_bits() } else { self.to_bits() })
             }
@@ -123,9 +127,10 @@ macro_rules! scalar_lanes {
             }
             #[inline(always)]
             fn marks(bit: usize) -> [Self; 2] {
-                // A table: a vector of one number is read faster than made of a register's.
-                static MARKS: [[$t; 2]; 64] = $marks();
-                MARKS[bit % 64]
+                // Tables: a vector of one number is read faster than made of a register's.
+                static LOW: [$t; 64] = $marks(0);
+                static HIGH: [$t; 64] = $marks(1);
+                [LOW[bit % 64], HIGH[bit % 64]]
             }
             #[inline(always)]
             fn word(halves: [Self; 2]) -> u64 {
@@ -136,24 +141,30 @@ macro_rules! scalar_lanes {
                 fn transposed(block: &[[Self; rows::ROW]; rows::ROW]) -> [[Self; rows::ROW]; rows::ROW] {
                     $transposed(block)
                 }
+                #[inline(always)]
+                fn reached(self, of: &[Self; 64]) -> u64 {
+                    $reached(self, of)
+                }
             )?
         }
     };
 }
 
-const fn marks32() -> [[f32; 2]; 64] {
-    let (mut marks, mut bit) = ([[0.0; 2]; 64], 0);
-    while bit < 64 {
-        marks[bit][bit / 32] = f32::from_bits(1 << (bit % 32));
+/// The lower (0) or upper (1) half of words of which each has another bit set.
+const fn marks32(half: usize) -> [f32; 64] {
+    let (mut marks, mut bit) = ([0.0; 64], 0);
+    while bit < 32 {
+        marks[32 * half + bit] = f32::from_bits(1 << bit);
         bit += 1;
     }
     marks
 }
 
-const fn marks64() -> [[f64; 2]; 64] {
-    let (mut marks, mut bit) = ([[0.0; 2]; 64], 0);
-    while bit < 64 {
-        marks[bit][0] = f64::from_bits(1 << bit);
+/// All of them; there is no second half.
+const fn marks64(half: usize) -> [f64; 64] {
+    let (mut marks, mut bit) = ([0.0; 64], 0);
+    while bit < 64 && half == 0 {
+        marks[bit] = f64::from_bits(1 << bit);
         bit += 1;
     }
     marks
@@ -170,7 +181,7 @@ fn word64([word, _]: [f64; 2]) -> u64 {
 }
 
 #[cfg(target_feature = "avx512f")]
-scalar_lanes!(f32, f32x8, f32x16, f32x16, marks32, word32, rows::transposed_floats);
+scalar_lanes!(f32, f32x8, f32x16, f32x16, marks32, word32, rows::transposed_floats, words::reached);
 #[cfg(not(target_feature = "avx512f"))]
-scalar_lanes!(f32, f32x8, f32x16, f32x8, marks32, word32, rows::transposed_floats);
+scalar_lanes!(f32, f32x8, f32x16, f32x8, marks32, word32, rows::transposed_floats, words::reached);
 scalar_lanes!(f64, f64x8, f64x8, f64x8, marks64, word64);

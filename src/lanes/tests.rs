@@ -32,7 +32,7 @@ fn check_width<V: Lanes>() {
             let b: Vec<V::Scalar> = (0..V::N).map(|i| hard[(start + 5 * i + shift) % hard.len()]).collect();
             let c: Vec<V::Scalar> = (0..V::N).map(|i| hard[(start + 7 * i + 3 * shift) % hard.len()]).collect();
             let (va, vb, vc) = (V::load(&a), V::load(&b), V::load(&c));
-            let pairs: [(V, Operation<V::Scalar>); 12] = [
+            let pairs: [(V, Operation<V::Scalar>); 14] = [
                 (va + vb, |a, b, _| a + b),
                 (va - vb, |a, b, _| a - b),
                 (va * vb, |a, b, _| a * b),
@@ -44,6 +44,8 @@ fn check_width<V: Lanes>() {
                 (va.fast_max(vb), |a, b, _| a.fast_max(b)),
                 (va.mul_add(vb, vc), |a, b, c| a.mul_add(b, c)),
                 (V::select(va.cmp_lt(vb), va, vc), |a, b, c| if a < b { a } else { c }),
+                (va.kept(va.cmp_lt(vb)), |a, b, _| if a < b { a } else { V::Scalar::ZERO }),
+                (va.turned_as(vb), |a, b, _| if b.to_f64().is_sign_negative() { -a } else { a }),
                 (finite_rcp(va), |a, _, _| finite_rcp(a)),
             ];
             for (op, (vector, scalar)) in pairs.into_iter().enumerate() {

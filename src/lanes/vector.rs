@@ -136,6 +136,10 @@ macro_rules! vector_lanes {
                 $v::sqrt(self)
             }
             #[inline(always)]
+            fn turned_as(self, sign: Self) -> Self {
+                self ^ sign & $v::splat(-0.0)
+            }
+            #[inline(always)]
             fn with_bits(self, mask: Self::Mask, bits: Self) -> Self {
                 // One instruction with mask registers, two without.
                 if cfg!(target_feature = "avx512f") { mask.0.select(self | bits, self) } else { self | mask.0 & bits }

@@ -3,7 +3,7 @@
 //! portable form bit by bit.
 #![allow(unsafe_code, reason = "instructions no crate offers as safe functions")]
 
-use super::{LaneMask, Lanes};
+use super::{LaneMask, Lanes, Real};
 use wide::{f32x4, f32x8, f32x16, u8x16, u16x8, u32x16};
 
 /// The lower and the upper half.
@@ -197,6 +197,41 @@ fn list_bits_portable(mask: u32, base: u8, list: &mut [u8; 16]) -> usize {
     count
 }
 
+/// Which of 64 numbers `x` does not exceed, as bits.
+#[inline(always)]
+pub fn reached(x: f32, of: &[f32; 64]) -> u64 {
+    #[cfg(all(target_feature = "avx2", not(target_feature = "avx512f")))]
+    {
+        use std::arch::x86_64::{_CMP_LE_OQ, _mm256_castps_si256, _mm256_cmp_ps, _mm256_movemask_epi8};
+        use std::arch::x86_64::{_mm256_packs_epi16, _mm256_packs_epi32, _mm256_permutevar8x32_epi32, _mm256_set1_ps};
+        // Packing goes by halves of registers: the first halves of four comparisons, then the second ones.
+        const PLACES: [u32; 8] = [0, 4, 1, 5, 2, 6, 3, 7];
+        let eight = |i: usize| {
+            let of = f32x8::new(*of[8 * i..].first_chunk().expect("eight of 64"));
+            // SAFETY: compiled only where the whole build has AVX2; the instructions touch registers only. So below.
+            unsafe { _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(x), bytemuck::cast(of))) }
+        };
+        let half = |i: usize| {
+            // SAFETY: as above.
+            unsafe {
+                let first = _mm256_packs_epi32(eight(i), eight(i + 1));
+                let bytes = _mm256_packs_epi16(first, _mm256_packs_epi32(eight(i + 2), eight(i + 3)));
+                _mm256_movemask_epi8(_mm256_permutevar8x32_epi32(bytes, bytemuck::cast(PLACES))) as u32
+            }
+        };
+        u64::from(half(0)) | u64::from(half(4)) << 32
+    }
+    #[cfg(not(all(target_feature = "avx2", not(target_feature = "avx512f"))))]
+    reached_by_vectors(x, of)
+}
+
+/// The same of any scalars.
+#[inline(always)]
+pub fn reached_by_vectors<S: Real>(x: S, of: &[S; 64]) -> u64 {
+    let reach = |at: usize| u64::from(S::Wide::splat(x).cmp_le(S::Wide::load(&of[at..])).bits()) << at;
+    (0..64).step_by(S::Wide::N).fold(0, |all, at| all | reach(at))
+}
+
 /// Bit planes as numbers: bit `k` of number `i` is bit `i` of `planes[k]`.
 #[inline(always)]
 pub fn transpose_bits<const K: usize>(planes: [u32; K]) -> [u8; 16] {
@@ -289,6 +324,24 @@ mod tests {
             for (i, number) in got.into_iter().enumerate() {
                 let want: String = (0..5).rev().map(|k| if planes[k] >> i & 1 != 0 { '1' } else { '0' }).collect();
                 assert_eq!(format!("{number:05b}"), want);
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_reached() {
+        let mut next = numbers();
+        for _ in 0..200 {
+            let of: [f32; 64] = std::array::from_fn(|_| match next() % 8 {
+                0 => f32::INFINITY,
+                1 => f32::NAN,
+                2 => 0.5,
+                _ => next() as f32 / u32::MAX as f32,
+            });
+            for x in [0.5, f32::NEG_INFINITY, f32::INFINITY, f32::NAN] {
+                let want = (0..64).filter(|&i| x <= of[i]).fold(0u64, |bits, i| bits | 1 << i);
+                assert_eq!((reached(x, &of), reached_by_vectors(x, &of)), (want, want));
+                assert_eq!(f64::from(x).reached(&of.map(f64::from)), want);
             }
         }
     }

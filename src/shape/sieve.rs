@@ -168,8 +168,7 @@ impl<P: Lanes> Sieve<P> {
         let minor = |a: usize, b: usize| to_corner[a].mul_add(ray.dir[b], -(to_corner[b] * ray.dir[a]));
         let across = [minor(1, 2), minor(2, 0), minor(0, 1)];
         let speed = dot(self.normal, ray.dir);
-        let back = speed.cmp_lt(P::constant(0.0));
-        let faced = |x: P| P::select(back, -x, x);
+        let faced = |x: P| x.turned_as(speed);
         let (v, way) = (faced(dot(across, self.sides[1])), faced(dot(self.normal, to_corner)));
         let (w, speed) = (-faced(dot(across, self.sides[0])), speed.abs());
         let least = v.fast_min(w).fast_min(speed - v - w);

@@ -47,12 +47,11 @@ impl<S: Real> Best<S> {
     /// Rays whose segments, as far as they are still looked at, reach to `near`; of the first `len`, others are unspecified.
     #[inline(always)]
     pub fn reaching<V: Lanes<Scalar = S>>(&self, near: S, len: usize) -> Set {
-        let near = V::splat(near);
-        let reach = |at: usize| Set::from(near.cmp_le(V::load(&self.t[at..])).bits()) << at;
         if len <= V::N {
-            return reach(0);
+            return Set::from(V::splat(near).cmp_le(V::load(&self.t)).bits());
         }
-        (0..RAYS).step_by(V::N).fold(0, |all, at| all | reach(at))
+        let half = |half: usize| self.t[64 * half..].first_chunk().map_or(0, |of| near.reached(of));
+        Set::from(half(0)) | if len > 64 { Set::from(half(1)) << 64 } else { 0 }
     }
 
     /// The hits of rays `at..at + N`.

@@ -89,6 +89,12 @@ impl<'a> Next<'a> {
         Self { columns: Columns::of(rays), group: Cell::new(group), end: group + GROUPS }
     }
 
+    /// How far the memory was asked: the number of the next group.
+    #[inline(always)]
+    pub fn asked(&self) -> usize {
+        self.group.get()
+    }
+
     /// Asks for the next few.
     #[inline(always)]
     pub fn ask(&self) {

@@ -2,7 +2,7 @@
 //! all at once, as bits in which some ray is another than it is taken for.
 
 use super::bundle::{Bundle, Shared, Source, TAME};
-use super::columns::Columns;
+use super::columns::{AHEAD, Columns};
 use super::groups::{Groups, NO_SLOT};
 use super::{SET, V};
 use crate::lanes::minima::{quarter_minima, quarters};
@@ -39,9 +39,12 @@ impl Groups {
         let from = bundle.first / V::N;
         let (zero, one, infinite) = (V::constant(0.0), V::constant(1.0), V::splat(f32::INFINITY));
         let apex = bundle.apex.map(V::splat);
-        let frame = self.frame;
+        let (frame, asked) = (self.frame, self.asked);
         let (mut other, mut total, mut shortest, mut slowest) = (zero, zero, infinite, infinite);
         self.fill_with::<N>(|g| {
+            if from + g + AHEAD >= asked {
+                columns.prefetch(from + g + AHEAD);
+            }
             let group = columns.get(from + g);
             let [x, y, z] = each(|a| group.org[a] ^ apex[a]);
             other = other | x | y | z | group.t_min | (group.t_max ^ infinite);

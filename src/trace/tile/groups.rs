@@ -119,6 +119,8 @@ pub struct Groups {
     pub slack: f32,
     /// The frame.
     pub frame: Frame,
+    /// From this group of the batch on the memory was not asked for rays yet.
+    pub asked: usize,
 }
 
 impl Default for Groups {
@@ -149,6 +151,7 @@ impl Default for Groups {
             cap: 0.0,
             slack: 0.0,
             frame: Frame::default(),
+            asked: 0,
         }
     }
 }

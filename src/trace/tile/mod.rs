@@ -185,6 +185,7 @@ impl<'a> Job<'a> {
         // What one call learns must not change what another one answers.
         self.memory.slabs.forget();
         columns::prefetch_first(self.rays);
+        self.memory.groups.asked = AHEAD;
         for first in (0..self.rays.len()).step_by(BLOCK) {
             if !suits {
                 self.leave::<SETS>(first);
@@ -318,6 +319,7 @@ impl<'a> Job<'a> {
         let next = Next::of(self.rays, bundle.first + bundle.len * V::N);
         let exact = Exact { bundle, world: self.world, object: self.world.first_object(), next };
         walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
+        self.memory.groups.asked = exact.next.asked();
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
             if !self.past {
                 self.output.prefetch(bundle.first + (g + AHEAD) * V::N);
