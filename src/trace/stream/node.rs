@@ -6,11 +6,17 @@ use crate::lanes::marks::Marks;
 use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::slab::{Interval, PAD, pad};
 
-/// From this many rays on they are tested as vectors, if that is less to do.
+/// From this many rays on, for each register that a vector of rays fills, they are tested as vectors, if that is less to do.
 pub const DENSE: u32 = 32;
 
-/// How many rays' tests of a node take as long as a vector's test of one box.
+/// How many rays' tests of a node take as long as a register's test of one box.
 const BOX: u32 = 2;
+
+/// How many registers a vector of rays takes.
+const fn registers<V: Lanes>() -> u32 {
+    let lanes = <<V::Scalar as Real>::Children as Lanes>::N;
+    V::N.div_ceil(lanes) as u32
+}
 
 /// Which rays meet which child of a node that has `W`.
 pub struct Met<S, const W: usize> {
@@ -53,11 +59,12 @@ pub fn meet<V: Lanes, E: Lanes<Scalar = V::Scalar>, const W: usize, const ANY: b
     octant: usize,
 ) -> Met<V::Scalar, W> {
     let many = rays.count_ones();
-    if many >= DENSE
+    if many >= const { DENSE * registers::<V>() }
         && let Some(bounds) = &chunk.bounds
     {
         let children = bounds.children::<E, W>(&planes(node, octant), octant) & ((1 << node.used) - 1);
-        if BOX * children.count_ones() * chunk.len.div_ceil(V::N) as u32 <= many {
+        let boxes = children.count_ones() * chunk.len.div_ceil(V::N) as u32;
+        if const { BOX * registers::<V>() } * boxes <= many {
             return dense::<V, W, ANY, false>(node, chunk, t, rays, (octant, children));
         }
     }
