@@ -77,6 +77,12 @@ pub fn largest(v: Lanes3<V>) -> V {
     v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs())
 }
 
+/// Sum of absolute components.
+#[inline(always)]
+pub fn sum(v: Lanes3<V>) -> V {
+    v[0].abs() + v[1].abs() + v[2].abs()
+}
+
 /// Number of groups of 16 in the `N` sets that start with ray `first`.
 #[inline(always)]
 pub fn groups<const N: usize>(rays: &Rays<f32>, first: usize) -> usize {
@@ -321,9 +327,14 @@ impl Passing {
             At::Limit => t_max,
         };
         // Differences first: the sum would hide what it rounds away.
-        let miss = each(|a| dir[a].mul_add(t, org[a] - V::splat(apex[a])).abs());
-        self.apart = select(lanes, miss[0] + miss[1] + miss[2], self.apart).fast_max(self.apart);
-        self.size = select(lanes, largest(org), self.size).fast_max(self.size);
+        let miss = each(|a| dir[a].mul_add(t, org[a] - V::splat(apex[a])));
+        self.take(sum(miss).kept(lanes), largest(org).kept(lanes));
+    }
+
+    /// Adds what vectors of rays miss the end by, and the largest coordinates of their origins.
+    #[inline(always)]
+    pub fn take(&mut self, miss: V, size: V) {
+        (self.apart, self.size) = (miss.fast_max(self.apart), size.fast_max(self.size));
     }
 
     /// How far all pass at most, if that can be rounding: at most 64 half ulps of the largest coordinate.

@@ -71,6 +71,16 @@ impl<'a> Columns<'a> {
     }
 }
 
+impl Columns<'_> {
+    /// The same unless it was asked for already, as all groups before `asked` were.
+    #[inline(always)]
+    pub fn prefetch_from(&self, asked: usize, i: usize) {
+        if i >= asked {
+            self.prefetch(i);
+        }
+    }
+}
+
 /// The rays that come after those of a tile: the memory is asked for them while the tile is traced, a few groups at a time.
 #[derive(Debug)]
 pub struct Next<'a> {

@@ -95,7 +95,7 @@ pub struct Groups {
     pub loose: f32,
     /// Per group, sixteen in the lanes of a vector: least and greatest s, least and greatest t.
     pub rect: [[[V; SETS]; 2]; 2],
-    /// The same as rectangles of one size, if they nearly are.
+    /// Of a full tile the same as rectangles of one size, if they nearly are.
     pub even: Option<Even>,
     /// The same as fractions of the tile's rectangle.
     pub part: [[[V; SETS]; 2]; 2],
@@ -183,7 +183,7 @@ impl Groups {
         };
         let from = bundle.first / V::N;
         let all = u64::MAX >> (GROUPS - N * SET);
-        let full = !EXACT && groups == all && self.fill::<N>(bundle);
+        let full = !EXACT && groups == all && self.fill::<N, ANY>(bundle, &mut look, &mut reach);
         if full {
             whole = all;
         } else {
@@ -198,7 +198,7 @@ impl Groups {
                     {
                         let group = segments.insert(columns.get(from + g));
                         if bundle.presumed {
-                            columns.prefetch(from + g + AHEAD);
+                            columns.prefetch_from(self.asked, from + g + AHEAD);
                             let Some(lanes) = bundle.look::<ANY>(g, group, &mut look) else { return false };
                             (tame, bundle.tame[g]) = (lanes, lanes);
                         }
@@ -238,11 +238,7 @@ impl Groups {
                         front = select(lanes, lines.behind / lines.slowness, front).fast_min(front);
                     }
                 }
-                let [low_s, low_t, high_s, high_t] = quarter_minima(&self.ends);
-                self.rect[0][0][q] = low_s;
-                self.rect[0][1][q] = -high_s;
-                self.rect[1][0][q] = low_t;
-                self.rect[1][1][q] = -high_t;
+                self.surround(q);
                 let [whole, live] = [whole, live].map(|groups: u64| (groups >> (q * SET)) as u32 & 0xffff);
                 match !EXACT && bundle.shared == Shared::Start && whole == 0xffff {
                     true => self.least[q] = select(Mask::from_bits(live), V::constant(0.0), most),
@@ -300,6 +296,14 @@ impl Groups {
         true
     }
 
+    /// Rectangles around the groups of a set by their [`Self::ends`].
+    #[inline(always)]
+    pub fn surround(&mut self, q: usize) {
+        let [low_s, low_t, high_s, high_t] = quarter_minima(&self.ends);
+        [self.rect[0][0][q], self.rect[0][1][q]] = [low_s, -high_s];
+        [self.rect[1][0][q], self.rect[1][1][q]] = [low_t, -high_t];
+    }
+
     /// The ends of the segments, moved apart by what rounding may have done to them.
     #[inline(always)]
     fn loosen<const N: usize, const ANY: bool, const EXACT: bool>(&mut self, near: V) {
@@ -353,7 +357,7 @@ impl Groups {
 
     /// How far the groups of a set look, by the ends of their rays' segments or what these found.
     #[inline(always)]
-    fn look_far(&mut self, q: usize) {
+    pub fn look_far(&mut self, q: usize) {
         if let Some(of) = self.of[q * SET..].first_chunk::<SET>() {
             self.least[q] = row_minima_of(|i| of[i].inv_lo);
         }

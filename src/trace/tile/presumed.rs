@@ -1,7 +1,7 @@
 //! Blocks that seem to have a point in common: their first group with a live ray says which, and who loads the others looks
 //! at them then. So rays are read from memory once.
 
-use super::bundle::{Bundle, Passing, Shared, Source, TAME, groups};
+use super::bundle::{Bundle, Passing, Shared, Source, TAME, groups, sum};
 use super::columns::Segments;
 use super::{GROUPS, SETS, V};
 use crate::lanes::{LaneMask, Lanes, Lanes3, each};
@@ -23,7 +23,7 @@ pub enum First<'a> {
 
 /// What loading a presumed bundle tells of its rays.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Look(Passing);
+pub struct Look(pub Passing);
 
 impl<'a> First<'a> {
     /// Looks at the block that starts with ray `first`. `any`: a common end will do.
@@ -58,7 +58,6 @@ impl Bundle<'_> {
     pub fn look<const ANY: bool>(&self, g: usize, segments: &Segments, look: &mut Look) -> Option<u32> {
         let Source::Batch(rays) = self.source else { return Some(self.tame[g]) };
         let Segments { org, dir, t_min, t_max } = *segments;
-        let sum = |v: Lanes3<V>| v[0].abs() + v[1].abs() + v[2].abs();
         let (size, least, most) = (sum(dir), V::splat(3.0 * TAME.0), V::splat(TAME.1));
         let mut lanes = least.cmp_le(size) & size.cmp_le(most) & V::constant(0.0).cmp_le(t_min) & t_min.cmp_le(t_max);
         match self.shared {
