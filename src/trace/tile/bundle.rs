@@ -1,7 +1,7 @@
 //! What the rays of a block have in common: the point they start from, or (any-hit) the point they end in.
 
 use super::columns::{AHEAD, Columns, Segments};
-use super::{GROUPS, HALF_ULP, Mask, SET, V, select};
+use super::{GROUPS, HALF_ULP, Mask, SET, V};
 use crate::lanes::words::greatest;
 use crate::lanes::{Column, LaneMask, Lanes, Lanes3, each, map3};
 use crate::ray::{Packet, Pencil, Rays};

@@ -4,7 +4,7 @@
 use super::bundle::{Bundle, Passing, Shared, Source, TAME, groups, sum};
 use super::columns::Segments;
 use super::{GROUPS, SETS, V};
-use crate::lanes::{LaneMask, Lanes, Lanes3, each};
+use crate::lanes::{LaneMask, Lanes, each};
 use crate::ray::{Packet, Rays};
 
 /// What the first group with a live ray says of a block.
