@@ -69,9 +69,7 @@ impl<'a> Columns<'a> {
             prefetch_for_later(column, i);
         }
     }
-}
 
-impl Columns<'_> {
     /// The same unless it was asked for already, as all groups before `asked` were.
     #[inline(always)]
     pub fn prefetch_from(&self, asked: usize, i: usize) {
