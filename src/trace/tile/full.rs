@@ -277,7 +277,7 @@ mod tests {
             |rays, i| rays.org[2][i] = 1e16,
             |rays, i| rays.set(i, POINT, [0.0; 3], 0.0, 1.0),
             // Past the light.
-            |rays, i| rays.dir[1][i] *= 1.01,
+            |rays, i| rays.dir[1][i] += 0.01,
             // From behind the light, as the others see it.
             |rays, i| rays.set(i, each(|a| 2.0 * POINT[a] - rays.org(i)[a]), each(|a| -rays.dir(i)[a]), 0.0, 1.0),
         ];
