@@ -13,8 +13,8 @@ pub struct VectorMask<V>(V);
 
 /// `v`, in a way that hides from the compiler where it comes from.
 ///
-/// A choice between a number and what memory holds that is stored there again becomes a store under a mask otherwise, which takes AMD's
-/// CPUs up to dozens of cycles where masks are vectors; choosing and storing takes two.
+/// A choice between a number and what memory holds that is stored there again becomes a store under a mask otherwise, which took a
+/// Zen 3 six times as long as choosing and storing (results/NOTES.md, "Registers of eight").
 #[inline(always)]
 fn hidden<V: bytemuck::Pod>(v: V) -> V {
     #[cfg(all(target_feature = "avx", not(target_feature = "avx512f"), not(miri)))]
