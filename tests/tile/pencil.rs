@@ -61,7 +61,7 @@ fn compare(scene: &Scene, camera: &Camera, edge: u32, rect: PixelRect, sub_pixel
             assert_eq!((got.t[i], got.prim[i], got.inst[i]), (f32::INFINITY, INVALID_ID, INVALID_ID), "a dead ray");
         }
         count += want.hit_count();
-        explained(scene, &rays, &Answers::Closest(vec![want.clone()]), Answers::Closest(vec![got.clone()]));
+        explained(scene, &rays, &Answers::Closest(vec![want.clone()]), &Answers::Closest(vec![got.clone()]));
     }
     [made, tiling.tiles() as usize, count]
 }
