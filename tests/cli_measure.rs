@@ -67,6 +67,26 @@ fn bench_prints_a_table_and_writes_rows_facts_and_a_picture() {
     assert!(facts.contains(said) && said.contains(" GHz: multiply") && said.contains(" per cycle"), "{said}");
 }
 
+/// Rays that a camera makes under the clock are checked against those it makes beforehand, in either precision: with an eye point,
+/// where engines are told where the rays go, and without.
+#[test]
+fn cameras_make_the_rays_that_are_checked() {
+    let dir = square();
+    for (scene, engines) in [("square.ply", "scalar,packet8,stream,tile"), ("builtin:die", "scalar,packet8,stream")] {
+        for precision in ["f32", "f64"] {
+            for projection in ["", " --az 35 --el 25"] {
+                let engines = if precision == "f64" { "scalar,packet8,stream" } else { engines };
+                let line = format!("bench {scene} --size 70x40 --rays primary,camera --engines {engines} --repeat 1");
+                let line = format!("{line} --precision {precision}{projection} -o out");
+                run(&dir, &line);
+                let csv = std::fs::read_to_string(dir.path().join("out/bench.csv")).expect("rows");
+                let made = csv.lines().filter(|row| row.contains(",camera,") && row.contains(",ok,")).count();
+                assert_eq!(made, engines.split(',').count(), "{line}: {csv}");
+            }
+        }
+    }
+}
+
 /// Three threads, however many cores there are: rows of one, two and three, with one checksum.
 #[test]
 fn scaling_has_rows_of_each_number_of_threads() {

@@ -43,12 +43,12 @@ Examples:
   lanecast bench --experiment scenes/experiments/widths.kdl -o out/widths
   lanecast bench model.ply --record results
 
-Before the clock starts, every engine's hits are compared bit for bit with the scalar engine's (those of tile,
-which has an arithmetic of its own, up to rounding, and the f64 oracle must explain the others), and a sample of
-those with the oracle; a wrong engine gets no figure and the exit code is 1. Engines take turns
-(A B C, A B C, ...) so that a disturbance of the machine falls on all alike. The clock covers traversal of
-packed rays and the writing of hits, nothing else. Peers take their turns in the same run; their hits may
-differ from ours by rounding, but one ray in 100000 at most may differ for another reason.";
+Before the clock starts, every engine's hits are compared bit for bit with the scalar engine's (those of tile, which \
+has an arithmetic of its own, up to rounding, and the f64 oracle must explain the others), and a sample of those \
+with the oracle; a wrong engine gets no figure and the exit code is 1. Engines take turns (A B C, A B C, ...) so \
+that a disturbance of the machine falls on all alike. The clock covers traversal of packed rays and the writing of \
+hits, nothing else. Peers take their turns in the same run; their hits may differ from ours by rounding, but one ray \
+in 100000 at most may differ for another reason.";
 
 /// Arguments of `lanecast bench`.
 #[derive(Debug, clap::Args)]

@@ -26,19 +26,19 @@ Examples:
   lanecast convert moss.asc --top all.g -o moss.stl
   lanecast render bolt.stl -o bolt.png          the mesh, to compare with the solid
 
-What is converted: trees of solids (union, intersection, difference, xor), spheres, boxes, cylinders and cones, all
-of them together as one solid; with --solid only those trees and `define`s. Loose meshes and discs have no inside and
-are left out; planes have no bounds and are refused, so scenes with a ground plane want --solid.
+What is converted: trees of solids (union, intersection, difference, xor), spheres, boxes, cylinders and cones, all \
+of them together as one solid; with --solid only those trees and `define`s. Loose meshes and discs have no inside \
+and are left out; planes have no bounds and are refused, so scenes with a ground plane want --solid.
 
-A mesh is closed and a manifold, which is checked before it is written: every edge is in two triangles. Edges and
-corners stay sharp. The first grid has cells of four times the tolerance (16 to 64 along the longest side); they are
-halved until no distance measured between mesh and solid, either way, is larger than the tolerance; the largest ones
-are printed. Parts thinner than a cell can be missed: a smaller --tolerance or more --cells finds them. Vertices are
+A mesh is closed and a manifold, which is checked before it is written: every edge is in two triangles. Edges and \
+corners stay sharp. The first grid has cells of four times the tolerance (16 to 64 along the longest side); they are \
+halved until no distance measured between mesh and solid, either way, is larger than the tolerance; the largest ones \
+are printed. Parts thinner than a cell can be missed: a smaller --tolerance or more --cells finds them. Vertices are \
 written as f32.
 
-Voxels (.npy) are u1 flags of shape (nz, ny, nx), 1 where the voxel's middle is inside; origin (the middle of
-voxel 0 0 0) and spacing are printed. The tolerance is half a voxel's diagonal. With --voxels, .stl, .obj and .ply
-get the outer faces of the voxels inside, as a closed mesh: the same voxels as a picture.
+Voxels (.npy) are u1 flags of shape (nz, ny, nx), 1 where the voxel's middle is inside; origin (the middle of voxel \
+0 0 0) and spacing are printed. The tolerance is half a voxel's diagonal. With --voxels, .stl, .obj and .ply get the \
+outer faces of the voxels inside, as a closed mesh: the same voxels as a picture.
 
 docs/CONVERT.md compares ray-traced CSG, its mesh and its voxels in pictures and in a table.";
 

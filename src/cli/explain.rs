@@ -32,12 +32,13 @@ Examples:
   lanecast explain model.ply --rays diffuse --engine scalar,packet16
   lanecast explain model.ply --rays shadow --engine packet16,tile -o why
 
-Every engine is counted packet by packet: node visits, box and primitive tests, lanes in use, bytes looked at; the
-times of the 32x32 pixel tiles are fitted to these counts, which says where the time goes. Of the tree: SAH cost,
-end-point overlap, sizes and depths of leaves; of the rays: the depth at which those of a packet part. For scenes of
-triangles, the limit: how long the machine's lanes take for the counted tests alone, by single tests measured in the same
-run (docs/METHODOLOGY.md says what that is and is not). With -o, what each pixel cost: cost-CLASS-ENGINE.exr and .png.
-Engines are not checked here (verify does that); figures of speed are of one thread and only to go with the counts.";
+Every engine is counted packet by packet: node visits, box and primitive tests, lanes in use, bytes looked at; the \
+times of the 32x32 pixel tiles are fitted to these counts, which says where the time goes. Of the tree: SAH cost, \
+end-point overlap, sizes and depths of leaves; of the rays: the depth at which those of a packet part. For scenes of \
+triangles, the limit: how long the machine's lanes take for the counted tests alone, by single tests measured in the \
+same run (docs/METHODOLOGY.md says what that is and is not). With -o, what each pixel cost: cost-CLASS-ENGINE.exr \
+and .png. Engines are not checked here (verify does that); figures of speed are of one thread and only to go with \
+the counts.";
 
 /// Arguments of `lanecast explain`.
 #[derive(Debug, clap::Args)]

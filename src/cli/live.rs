@@ -37,10 +37,11 @@ Examples:
   lanecast view scene.kdl --camera side --spp 16
   lanecast view model.ply --headless-script orbit.txt
 
-Drag to orbit, wheel to zoom, V for sliders of the scene's parameters, F1 for all keys. The scene is opened anew when a file in its folder changes.
-A script has one command per line (docs/VIEW.md): orbit, turn, pan, zoom, fly, widen, fov, camera, reset, integrator,
-engine, heat, exposure, spp, blocks, wait, frame, spin, click, save, set, reload. What wait, frame, spin, click, set and
-reload find is printed as one JSON object per line.";
+Drag to orbit, wheel to zoom, V for sliders of the scene's parameters, F1 for all keys. The scene is opened anew \
+when a file in its folder changes.
+A script has one command per line (docs/VIEW.md): orbit, turn, pan, zoom, fly, widen, fov, camera, reset, \
+integrator, engine, heat, exposure, spp, blocks, wait, frame, spin, click, save, set, reload. What wait, frame, \
+spin, click, set and reload find is printed as one JSON object per line.";
 
 /// Arguments of `lanecast view`.
 #[derive(Debug, clap::Args)]

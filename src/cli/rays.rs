@@ -23,11 +23,11 @@ Examples:
   lanecast rays model.ply --kind ao --size 512x512 --seed 7 -o ao.npy
   lanecast rays model.ply --kind shadow --eye 0,1,5 --look-at 0,1,0 -o shadow.npy
 
-Kinds: primary; shadow (to the scene's first point light, or one just above the eye, which is t = 1);
-ao (one cosine-distributed ray per hit, 5 % of the scene's diagonal long); reflect (mirror); diffuse (cosine);
-scatter (aimed at random primitives from all sides, as many as there are pixels, in no order).
-The order is that of 32x32 pixel tiles, Morton order inside. Where a primary ray misses, the others are dead
-(t_max < t_min).";
+Kinds: primary; shadow (to the scene's first point light, or one just above the eye, which is t = 1); ao (one \
+cosine-distributed ray per hit, 5 % of the scene's diagonal long); reflect (mirror); diffuse (cosine); scatter \
+(aimed at random primitives from all sides, as many as there are pixels, in no order).
+The order is that of 32x32 pixel tiles, Morton order inside. Where a primary ray misses, the others are dead (t_max \
+< t_min).";
 
 /// Arguments of `lanecast rays`.
 #[derive(Debug, clap::Args)]

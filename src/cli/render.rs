@@ -51,9 +51,9 @@ Examples:
   lanecast render builtin:forest -o forest.exr --spp 64 --preview tev
   lanecast render turn.kdl -o turn.exr --frames 1..48 --resume
 
-The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as
-float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy), .pix (BRL-CAD's: linear,
-8 bits, no header). Ctrl-C writes the finished tiles and exits with 130.";
+The file's extension chooses the format: .exr (float, all planes, attributes), .png (sRGB, 8 bits), .npy (R G B A as \
+float, shape (height, width, 4); each further plane in a file beside it, NAME.PLANE.npy), .pix (BRL-CAD's: linear, 8 \
+bits, no header). Ctrl-C writes the finished tiles and exits with 130.";
 
 /// Arguments of `lanecast render`.
 #[derive(Clone, Debug, clap::Args)]

@@ -15,10 +15,11 @@ Examples:
   lanecast report out -o out/report.html --title \"Sponza, one thread\"
   lanecast report results --readme README.md
 
-DIR is what `bench -o`, `bench --record` or `bench --experiment` wrote: every bench.csv in it and below, with the facts
-and pictures beside. The page holds all it needs: no other file, nothing from the network. Pictures of the same name in
-different folders, or NAME.reference.exr beside NAME.exr, are compared. With --readme no page is made: tables of rates are
-put between the marks of a text, `<!-- figures` and `<!-- end of figures -->` (docs/METHODOLOGY.md).";
+DIR is what `bench -o`, `bench --record` or `bench --experiment` wrote: every bench.csv in it and below, with the \
+facts and pictures beside. The page holds all it needs: no other file, nothing from the network. Pictures of the \
+same name in different folders, or NAME.reference.exr beside NAME.exr, are compared. With --readme no page is made: \
+tables of rates are put between the marks of a text, `<!-- figures` and `<!-- end of figures -->` \
+(docs/METHODOLOGY.md).";
 
 /// Arguments of `lanecast report`.
 #[derive(Debug, clap::Args)]

@@ -32,7 +32,7 @@ Examples:
   lanecast trace model.ply --rays primary.npy --hits hits.npy --repeat 1
 
 RAYS are NumPy little-endian f4 of shape (N, 8): ox oy oz t_min dx dy dz t_max.
-The hits are compared with the scalar engine's before the clock starts: bit for bit, or, for the engine tile, up to
+The hits are compared with the scalar engine's before the clock starts: bit for bit, or, for the engine tile, up to \
 what the f64 oracle explains by rounding.";
 
 /// Arguments of `lanecast trace`.

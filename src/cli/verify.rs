@@ -17,11 +17,11 @@ Examples:
   lanecast verify builtin:sphere-flake
   lanecast verify model.ply --rays 100000 --kinds primary,diffuse --precision f32
 
-Every engine answers closest-hit and any-hit queries for every ray class. Each answer is judged by an f64
-brute-force oracle (same, explained by a rounding margin, or unexplained) and compared bit for bit with the
-scalar engine and with itself when the rays come in another order (tile, which has an arithmetic of its own,
-only with itself, when the same batches come in another order). The table adds up the engines; -v shows
-each, and so does a failure. Exit code 1 if any answer is unexplained or any bit differs.";
+Every engine answers closest-hit and any-hit queries for every ray class. Each answer is judged by an f64 \
+brute-force oracle (same, explained by a rounding margin, or unexplained) and compared bit for bit with the scalar \
+engine and with itself when the rays come in another order (tile, which has an arithmetic of its own, only with \
+itself, when the same batches come in another order). The table adds up the engines; -v shows each, and so does a \
+failure. Exit code 1 if any answer is unexplained or any bit differs.";
 
 /// Arguments of `lanecast verify`.
 #[derive(Debug, clap::Args)]

@@ -8,7 +8,7 @@ use crate::measure::answers::Answers;
 use crate::measure::explain::{self, Costs, Limit};
 use crate::measure::eye::{Framing, View};
 use crate::measure::peers::{Guest, Invitation, Peer};
-use crate::measure::raysets::{RayKind, calls, convert};
+use crate::measure::raysets::{RayKind, calls};
 use crate::measure::rows::{Outcome, PeerRow, Row, SceneFacts};
 use crate::measure::stats::{median, paired_ratio_median, summary};
 use crate::measure::timing::{Load, Series, Tracer, Workers, interleave};
@@ -84,12 +84,13 @@ pub fn scene<S: Engines>(
     let costs = explain::is_of_triangles(&world).then(|| workers.install(explain::costs::<S>));
     let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests, costs };
     for &kind in &plan.kinds {
-        let rays = workers.install(|| view.rays(&world, kind))?;
         if kind == RayKind::Camera {
+            let batches = workers.install(|| view.made::<S>());
             let maker = |tile: usize, pencil: &mut Pencil, rays: &mut Rays<S>| view.make(tile, pencil, rays);
-            let load = Load { batches: &convert(&rays), maker: Some(&maker) };
+            let load = Load { batches: &batches, maker: Some(&maker) };
             subject.class(kind, load, plan.repeat, stop, report)?;
         } else {
+            let rays = workers.install(|| view.rays(&world, kind))?;
             subject.class(kind, Load::packed(&calls(&rays, workers.threads())), plan.repeat, stop, report)?;
         }
     }

@@ -72,6 +72,12 @@ impl View {
         Made::Rays
     }
 
+    /// All that [`Self::make`] makes, one batch per tile, on the current rayon pool. In f64 these are not those of [`Self::primary`],
+    /// which are as a file of rays has them.
+    pub fn made<S: Real>(&self) -> Vec<Rays<S>> {
+        primary_rays(&self.camera, &self.tiling)
+    }
+
     /// The rays of class `kind` in `world`, on the current rayon pool: a tile per batch, or as many scattered rays
     /// as the picture has pixels. Hits on the way are those of the `scalar` engine.
     pub fn rays<S: Engines>(&self, world: &World<S>, kind: RayKind) -> Result<Vec<Rays<f32>>> {
@@ -88,7 +94,7 @@ impl View {
 }
 
 /// The rays of `camera` through the pixel centres of the picture, in ray-file order.
-fn primary_rays(camera: &Camera, tiling: &Tiling) -> Vec<Rays<f32>> {
+fn primary_rays<S: Real>(camera: &Camera, tiling: &Tiling) -> Vec<Rays<S>> {
     let tile = |tile| {
         let mut rays = Rays::new(0);
         make(camera, tiling, tile, &mut rays);
