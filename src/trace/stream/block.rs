@@ -115,6 +115,18 @@ impl<V: Lanes> Bounds<V> {
     }
 }
 
+/// Whether the live rays of a vector look into several octants.
+#[inline(always)]
+fn turns<V: Lanes>(rays: &Rays<V::Scalar>, at: usize) -> bool {
+    let (live, zero) = (rays.live_vector::<V>(at), V::constant(0.0));
+    let some = |lanes: V::Mask| lanes.bits() & live != 0;
+    let [x, y, z] = each(|axis| {
+        let dir = V::load(&rays.dir[axis][at..]);
+        some(dir.cmp_lt(zero)) & some(zero.cmp_lt(dir))
+    });
+    x | y | z
+}
+
 impl<S: Real> Job<'_, S> {
     /// Traces the vectors of rays that start at `starts` as a block of size `size`, as smaller ones, or each by itself. Returns
     /// how many rays were sorted.
@@ -138,6 +150,10 @@ impl<S: Real> Job<'_, S> {
 
     /// Traces vectors of rays by one list of leaves; false if that is too long, or if they look into several octants.
     fn whole<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
+        // Most that look into several octants show it within the first vector.
+        if starts.first().is_some_and(|&at| turns::<V>(self.rays, at)) {
+            return false;
+        }
         let bounds = Bounds::<V>::of(self.rays, starts);
         if bounds.live == 0 {
             self.miss::<V>(starts);
