@@ -133,6 +133,12 @@ impl Engines for f32 {
     }
 }
 
+/// Vectors of rays of the stream kernel in f64: two registers.
+#[cfg(target_feature = "avx512f")]
+type Doubles = Pair<f64x8>;
+#[cfg(not(target_feature = "avx512f"))]
+type Doubles = f64x8;
+
 impl Engines for f64 {
     const PRECISION: &'static str = "f64";
 
@@ -145,7 +151,7 @@ impl Engines for f64 {
             &Generic::<f64x4, true>("packet4", PhantomData),
             &Generic::<f64x8, true>("packet8", PhantomData),
             &Generic::<Pair<f64x8>, true>("packet16", PhantomData),
-            &stream::Stream::<Pair<f64x8>>(PhantomData),
+            &stream::Stream::<Doubles>(PhantomData),
         ]
     }
 
