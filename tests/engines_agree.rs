@@ -2,7 +2,7 @@
 
 mod common;
 
-use lanecast::ray::{Counters, Hits, Rays};
+use lanecast::ray::{Counters, Hits, INVALID_ID, PAD, Rays};
 use lanecast::scene::world::{Preset, World};
 use lanecast::trace::{Engines, Scratch};
 
@@ -29,7 +29,15 @@ fn same_bits_of<S: Engines>(world: &World<S>, rays: &Rays<S>) -> usize {
     for engine in engines.iter().filter(|e| e.is_exact()) {
         for count in [false, true] {
             let mut counters = Counters::default();
+            // As after a call for more rays, all of which hit something.
+            got.reset(n + PAD);
+            got.prim.fill(0);
+            got.t.fill(S::ZERO);
             engine.intersect(world, rays, &mut got, &mut scratch, count.then_some(&mut counters));
+            for i in n..n.next_multiple_of(PAD) {
+                let padding = (got.t[i].to_f64(), got.prim[i], got.inst[i]);
+                assert_eq!(padding, (f64::INFINITY, INVALID_ID, INVALID_ID), "{} after {n} rays", engine.name());
+            }
             for i in 0..n {
                 let bits = |h: &Hits<S>| {
                     let exact = [h.t[i], h.u[i], h.v[i]].map(|x| x.to_f64().to_bits());
@@ -67,12 +75,19 @@ fn f64_engines_agree() {
     all_worlds::<f64>();
 }
 
+fn every_batch_length<S: Engines>() {
+    for instances in [false, true] {
+        let world = World::<S>::compile(&common::zoo(3, instances), Preset::Balanced).unwrap();
+        for n in (0..40).chain([255, 256, 257]) {
+            same_bits(&world, n as u64, n);
+        }
+    }
+}
+
 #[test]
 fn every_batch_length_and_an_empty_world() {
-    let world = World::<f32>::compile(&common::zoo(3, true), Preset::Balanced).unwrap();
-    for n in (0..40).chain([255, 256, 257]) {
-        same_bits(&world, n as u64, n);
-    }
+    every_batch_length::<f32>();
+    every_batch_length::<f64>();
     let nothing = lanecast::scene::description::Description::new("nothing");
     let world = World::<f64>::compile(&nothing, Preset::Balanced).unwrap();
     assert_eq!(same_bits(&world, 1, 50), 0);

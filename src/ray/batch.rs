@@ -168,7 +168,7 @@ impl<S: Real> Rays<S> {
     }
 }
 
-/// Hits of a batch. A miss has `t` = infinity and both ids [`INVALID_ID`].
+/// Hits of a batch. A miss has `t` = infinity and both ids [`INVALID_ID`]; the padding, up to a multiple of [`PAD`], is misses.
 #[derive(Clone, Debug, Default)]
 pub struct Hits<S> {
     len: usize,

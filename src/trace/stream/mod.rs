@@ -387,14 +387,14 @@ fn call<V: Lanes, const ANY: bool>(
 {
     let super::Memory { stack, stream: memory } = V::Scalar::memory(scratch);
     stack.reserve(world.stack_bound());
-    let (starts, apart, plain) = ((0..rays.len()).step_by(V::N), false, false);
-    match counters {
-        Some(counters) => {
-            Job { world, rays, memory, stack, counters, output, apart, plain }.run::<V, ANY, true>(starts)
-        }
-        None => {
-            let counters = &mut Counters::default();
-            Job { world, rays, memory, stack, counters, output, apart, plain }.run::<V, ANY, false>(starts);
-        }
+    // Hits of the padding are misses, whoever reads whole vectors of them.
+    let end = if ANY { rays.len() } else { rays.padded_len() };
+    let starts = (0..end).step_by(V::N);
+    let (mut uncounted, count) = (Counters::default(), counters.is_some());
+    let counters = counters.unwrap_or(&mut uncounted);
+    let mut job = Job { world, rays, memory, stack, counters, output, apart: false, plain: false };
+    match count {
+        true => job.run::<V, ANY, true>(starts),
+        false => job.run::<V, ANY, false>(starts),
     }
 }
