@@ -201,7 +201,7 @@ impl<S: Real> Hits<S> {
         [&mut self.prim, &mut self.inst].into_iter().for_each(|array| array.fill(INVALID_ID));
     }
 
-    /// Makes this `len` hits and misses, with unspecified contents: for who writes all of them.
+    /// Makes this `len` hits and misses, with unspecified contents: for who writes all of them, and misses to the padding.
     pub fn prepare(&mut self, len: usize) {
         let padded = len.next_multiple_of(PAD);
         self.len = len;

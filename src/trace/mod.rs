@@ -133,7 +133,7 @@ impl Engines for f32 {
     }
 }
 
-/// Vectors of rays of the stream kernel in f64: two registers.
+/// Vectors of rays of the stream kernel in f64: two registers of AVX-512 or of AVX2.
 #[cfg(target_feature = "avx512f")]
 type Doubles = Pair<f64x8>;
 #[cfg(not(target_feature = "avx512f"))]
