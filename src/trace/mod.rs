@@ -186,10 +186,7 @@ pub fn engine<S: Engines>(name: &str) -> Result<&'static dyn Engine<S>> {
 /// The generic engine of width `V::N`: over the tree, or (`TREE` false) over every primitive.
 struct Generic<V, const TREE: bool>(&'static str, PhantomData<fn() -> V>);
 
-impl<V: Lanes, const TREE: bool> Generic<V, TREE>
-where
-    V::Scalar: Engines,
-{
+impl<V: Lanes, const TREE: bool> Generic<V, TREE> {
     #[inline(always)]
     fn packet<const ANY: bool, const COUNT: bool>(
         world: &World<V::Scalar>,
@@ -226,15 +223,17 @@ where
         }
     }
 
+    /// Any-hit, the rays from `first` on: as many as `out` has places for.
+    #[inline(never)]
     fn any<const COUNT: bool>(
         world: &World<V::Scalar>,
-        rays: &Rays<V::Scalar>,
+        (rays, first): (&Rays<V::Scalar>, usize),
         out: &mut [u8],
         stack: &mut Stack<V::Scalar>,
         counters: &mut Counters,
     ) {
         for (i, lanes) in out.chunks_mut(V::N).enumerate() {
-            let (_, done) = Self::packet::<true, COUNT>(world, rays, i * V::N, stack, counters);
+            let (_, done) = Self::packet::<true, COUNT>(world, rays, first + i * V::N, stack, counters);
             for (lane, out) in lanes.iter_mut().enumerate() {
                 *out = (done >> lane & 1) as u8;
             }
@@ -284,8 +283,8 @@ where
         let stack = &mut V::Scalar::memory(scratch).stack;
         stack.reserve(world.stack_bound());
         match counters {
-            Some(counters) => Self::any::<true>(world, rays, out, stack, counters),
-            None => Self::any::<false>(world, rays, out, stack, &mut Counters::default()),
+            Some(counters) => Self::any::<true>(world, (rays, 0), out, stack, counters),
+            None => Self::any::<false>(world, (rays, 0), out, stack, &mut Counters::default()),
         }
     }
 }

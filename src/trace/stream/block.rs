@@ -13,9 +13,10 @@ use crate::bvh::{Bundle, Child, Tree, WIDTH};
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, each, map3};
 use crate::ray::slab::Interval;
 use crate::ray::{HitPacket, Packet, Rays};
-use crate::trace::leaf;
+use crate::trace::output::Output;
 use crate::trace::query::Query;
 use crate::trace::traverse::{self, Leaves, ObjectLeaves, TopLeaves};
+use crate::trace::{Generic, leaf};
 
 /// Vectors of rays of a block, and of its parts where it meets too much.
 pub const SIZES: [usize; 2] = [16, 4];
@@ -44,18 +45,20 @@ pub struct Block<S> {
     waiting: Vec<u32>,
     /// For each size: when to try the next one.
     patience: [Patience<1, PATIENCE>; SIZES.len()],
+    /// Whether the last one of the largest size looked into several octants.
+    turned: bool,
 }
 
 impl<S> Default for Block<S> {
     fn default() -> Self {
-        Self { list: Vec::new(), waiting: Vec::new(), patience: Default::default() }
+        Self { list: Vec::new(), waiting: Vec::new(), patience: Default::default(), turned: false }
     }
 }
 
 impl<S> Block<S> {
     /// Forgets what earlier calls found.
     pub fn start(&mut self) {
-        self.patience = Default::default();
+        (self.patience, self.turned) = Default::default();
     }
 }
 
@@ -136,11 +139,18 @@ impl<S: Real> Job<'_, S> {
         size: usize,
     ) -> usize {
         if starts.len() > 1 && self.memory.block.patience[size].is_over() {
-            let done = self.whole::<V, ANY, COUNT>(starts);
-            self.memory.block.patience[size].remember(done);
+            // Most that look into several octants show it within the first vector.
+            let turned = starts.first().is_some_and(|&at| turns::<V>(self.rays, at));
+            let done = !turned && self.whole::<V, ANY, COUNT>(starts);
+            let block = &mut self.memory.block;
+            block.patience[size].remember(done);
+            block.turned = if size == 0 { turned } else { block.turned };
             if done {
                 return 0;
             }
+        }
+        if ANY && self.memory.block.turned && self.packets::<V, COUNT>(starts) {
+            return 0;
         }
         match SIZES.get(size + 1) {
             Some(&smaller) => starts.chunks(smaller).map(|part| self.block::<V, ANY, COUNT>(part, size + 1)).sum(),
@@ -148,12 +158,21 @@ impl<S: Real> Job<'_, S> {
         }
     }
 
+    /// Any-hit: traces the vectors of rays that start at `starts` as the packet engine does; false if they do not follow each other.
+    fn packets<V: Lanes<Scalar = S>, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
+        let Self { world, rays, stack, counters, output, .. } = self;
+        match (starts, output) {
+            (&[first, .., last], Output::Any(out)) if last - first == (starts.len() - 1) * V::N => {
+                let out = &mut out[first..rays.len().min(last + V::N)];
+                Generic::<V, true>::any::<COUNT>(world, (rays, first), out, stack, counters);
+                true
+            }
+            _ => false,
+        }
+    }
+
     /// Traces vectors of rays by one list of leaves; false if that is too long, or if they look into several octants.
     fn whole<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, starts: &[usize]) -> bool {
-        // Most that look into several octants show it within the first vector.
-        if starts.first().is_some_and(|&at| turns::<V>(self.rays, at)) {
-            return false;
-        }
         let bounds = Bounds::<V>::of(self.rays, starts);
         if bounds.live == 0 {
             self.miss::<V>(starts);

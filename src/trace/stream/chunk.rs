@@ -107,6 +107,16 @@ pub fn row<V: Lanes>(packet: &Packet<V>, t_max: V) -> [V; ROW] {
     [ox, oy, oz, packet.t_min, dx, dy, dz, t_max]
 }
 
+/// Numbers of some rays side by side.
+#[inline(always)]
+pub fn gathered<V: Lanes>(column: &[V::Scalar; RAYS], of: &[u8]) -> V {
+    let mut numbers = [column[usize::from(of[0]) & (RAYS - 1)]; MAX_LANES];
+    for (to, &ray) in numbers.iter_mut().zip(of) {
+        *to = column[usize::from(ray) & (RAYS - 1)];
+    }
+    V::load(&numbers)
+}
+
 #[inline(always)]
 fn load3<V: Lanes>(from: &[[V::Scalar; RAYS]; 3], at: usize) -> Lanes3<V> {
     [V::load(&from[0][at..]), V::load(&from[1][at..]), V::load(&from[2][at..])]
@@ -274,6 +284,28 @@ impl<S: Real> Chunk<S> {
             dominant: map3(self.dominant, |mask| (mask >> at) as u32 & V::ALL),
             shear: load3(&self.shear, at),
         }
+    }
+
+    /// Some rays, at least one, side by side as a packet; other lanes have one of them.
+    #[inline(always)]
+    pub fn gathered<V: Lanes<Scalar = S>>(&self, of: &[u8]) -> Packet<V> {
+        let three = |from: &[[S; RAYS]; 3]| each(|a| gathered::<V>(&from[a], of));
+        let mut packet = Packet {
+            org: three(&self.org),
+            dir: three(&self.dir),
+            rcp: three(&self.rcp),
+            t_min: gathered(&self.t_min, of),
+            t_floor: gathered(&self.t_floor, of),
+            dominant: [0; 3],
+            shear: [V::constant(0.0); 3],
+        };
+        if self.sheared {
+            packet.shear = three(&self.shear);
+            packet.dominant = map3(self.dominant, |set| {
+                of.iter().enumerate().fold(0, |all, (lane, &ray)| all | ((set >> ray & 1) as u32) << lane)
+            });
+        }
+        packet
     }
 
     /// The octant of the first of some rays, and those of the same.

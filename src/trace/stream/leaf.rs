@@ -1,12 +1,12 @@
 //! Leaves: a chunk's rays against one block of primitives.
 
 use super::best::Best;
-use super::chunk::{Chunk, RAYS, Set};
+use super::chunk::{Chunk, RAYS, Set, gathered};
 use super::walk::Walk;
 use super::{due, sift};
 use crate::bvh::Child;
-use crate::lanes::{LaneMask, Lanes, Real, map3};
-use crate::ray::{Counters, HitPacket, Packet};
+use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real, map3};
+use crate::ray::{Counters, HitPacket, INVALID_ID, Packet};
 use crate::scene::world::{Class, Object};
 use crate::shape::{BLOCK, Block, Facts, Triangle};
 use crate::trace::leaf;
@@ -14,6 +14,9 @@ use crate::trace::query::Query;
 
 /// From this many rays in a vector on triangles are tested against it.
 const DENSE: u32 = 8;
+
+/// From this many times as many vectors on as they would fill, rays that lie scattered over them are brought together.
+const SCATTERED: usize = 2;
 
 /// Tests the block a leaf refers to.
 #[inline(always)]
@@ -62,7 +65,7 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
     sparse::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk, child, few);
 }
 
-/// Runs a packet kernel on the vectors of a chunk that hold some of `rays`.
+/// Runs a packet kernel on `rays`, vector by vector, or, if they lie scattered over many, side by side.
 #[inline(always)]
 pub fn vectors<V: Lanes, const ANY: bool, const COUNT: bool>(
     chunk: &Chunk<V::Scalar>,
@@ -70,10 +73,51 @@ pub fn vectors<V: Lanes, const ANY: bool, const COUNT: bool>(
     rays: Set,
     kernel: impl Fn(&Packet<V>, &mut Query<V, ANY, COUNT>, u32),
 ) {
+    let lanes = |at: usize| (rays >> at) as u32 & V::ALL;
+    let touched = (0..chunk.len).step_by(V::N).map(|at| usize::from(lanes(at) != 0)).sum::<usize>();
+    if touched >= SCATTERED * (rays.count_ones() as usize).div_ceil(V::N) {
+        return packed(chunk, walk, rays, kernel);
+    }
     for at in (0..chunk.len).step_by(V::N) {
-        let lanes = (rays >> at) as u32 & V::ALL;
+        let lanes = lanes(at);
         if lanes != 0 {
             vector(chunk, walk, at, lanes, &kernel);
+        }
+    }
+}
+
+/// Runs a packet kernel on `rays`, brought together in as few vectors as they fill.
+#[inline(always)]
+fn packed<V: Lanes, const ANY: bool, const COUNT: bool>(
+    chunk: &Chunk<V::Scalar>,
+    walk: &mut Walk<V::Scalar>,
+    rays: Set,
+    kernel: impl Fn(&Packet<V>, &mut Query<V, ANY, COUNT>, u32),
+) {
+    let mut rest = rays;
+    while rest != 0 {
+        let (mut of, mut count) = ([0; MAX_LANES], 0);
+        while rest != 0 && count < V::N {
+            of[count] = rest.trailing_zeros() as u8;
+            (rest, count) = (rest & (rest - 1), count + 1);
+        }
+        let of = &of[..count];
+        let (packet, t) = (chunk.gathered::<V>(of), gathered(&walk.best.t, of));
+        let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t), walk.stack, walk.counters);
+        kernel(&packet, &mut query, V::ALL >> (V::N - count));
+        let (hit, mut done) = (query.hit, query.done);
+        if ANY {
+            while done != 0 {
+                walk.best.done |= 1 << of[done.trailing_zeros() as usize];
+                done &= done - 1;
+            }
+            continue;
+        }
+        for (lane, &ray) in of.iter().enumerate() {
+            if hit.prim[lane] != INVALID_ID {
+                let numbers = [hit.t.lane(lane), hit.u.lane(lane), hit.v.lane(lane)];
+                walk.best.offer(ray.into(), numbers, hit.prim[lane], hit.inst[lane]);
+            }
         }
     }
 }
@@ -213,4 +257,82 @@ pub fn count(counters: &mut Counters, triangles: u8, rays: u32) {
     counters.prims += tests;
     counters.prim_lanes_active += tests;
     counters.prim_lanes_total += tests;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::chunk::row;
+    use super::super::sift::Sifted;
+    use super::super::walk::{Pile, Room};
+    use super::*;
+    use crate::lanes::rows::{Row, to_rows};
+    use crate::lanes::{f32x16, f64x8};
+    use crate::ray::{Candidate, Rays};
+    use crate::trace::query::Stack;
+
+    /// Takes every `step`th ray of a chunk, whose numbers tell which it is, to a kernel. Returns how many vectors that gets.
+    fn visit<V: Lanes, const ANY: bool>(step: usize, sheared: bool) -> usize {
+        let number = |i: usize| V::Scalar::from_f64(i as f64);
+        let mut all = Rays::<V::Scalar>::new(RAYS);
+        for i in 0..RAYS {
+            let dir = [number(1), number(2 + i % 2), number(i)];
+            all.set(i, [number(i), number(0), number(0)], dir, number(i), number(1000));
+        }
+        let (mut rows, places) = (vec![Row::ZERO; RAYS], (0..RAYS as u32).collect::<Vec<_>>());
+        for at in (0..RAYS).step_by(V::N) {
+            let (packet, t_max, _) = Packet::<V>::load(&all, at);
+            to_rows(row(&packet, t_max), &mut rows[at..]);
+        }
+        let (mut chunk, mut best) = (Chunk::default(), Best::default());
+        chunk.gather::<V, ANY>(&rows, &places, &mut best.t, sheared);
+        best.start();
+        let wanted = (0..RAYS).step_by(step).fold(0, |set, i| set | 1 << i);
+        // Of two hits as far the smaller number stays, whoever comes first.
+        best.offer(0, [number(0), number(0), number(0)], 0, 3);
+        best.offer(step, [number(step), number(0), number(0)], 9999, 3);
+        let (mut waiting, mut closer, mut sifted) = (Pile::default(), Closer::default(), Sifted::default());
+        let (mut stack, mut counters) = (Stack::default(), Counters::default());
+        let room = Room { waiting: &mut waiting, closer: &mut closer, sifted: &mut sifted };
+        let mut walk = Walk::new(&mut best, room, &mut stack, &mut counters, true);
+        let calls = std::cell::Cell::new(0);
+        vectors::<V, ANY, false>(&chunk, &mut walk, wanted, |packet, query, lanes| {
+            calls.set(calls.get() + 1);
+            for k in (0..V::N).filter(|k| lanes >> k & 1 != 0) {
+                let (got, i) = (packet.single(k), packet.org[0].lane(k).to_f64() as usize);
+                let ([org, dir], [t_min, _], _) = Packet::<V::Scalar>::read(&all, i);
+                let want = Packet::prepared(org, dir, t_min, sheared);
+                assert_eq!(format!("{got:?}"), format!("{want:?}"), "ray {i}");
+            }
+            // Every other one of the rays hits where it starts.
+            let hits = |k: usize| (packet.org[0].lane(k).to_f64() as usize).is_multiple_of(2 * step);
+            let hit = (0..V::N).fold(0, |bits, k| bits | u32::from(hits(k)) << k);
+            let found = Candidate { hit: V::Mask::from_bits(hit), t: packet.t_min, u: packet.org[0], v: packet.dir[1] };
+            query.take(lanes, &found, 7, 3);
+        });
+        for i in 0..RAYS {
+            let hits = wanted >> i & 1 != 0 && i % (2 * step) == 0;
+            if ANY {
+                assert_eq!(best.done >> i & 1 != 0, hits, "ray {i}");
+                continue;
+            }
+            let hit = best.packet::<V>(i / V::N * V::N).single(i % V::N);
+            let want = match (i, hits) {
+                (0, _) => (number(0), number(0), 0),
+                (_, true) => (number(i), number(i), 7),
+                _ if i == step => (number(i), number(0), 9999),
+                _ => (number(1000), number(0), INVALID_ID),
+            };
+            assert_eq!((hit.t, hit.u, hit.prim[0]), want, "ray {i}");
+        }
+        calls.get()
+    }
+
+    #[test]
+    fn scattered_rays_are_brought_together() {
+        for sheared in [false, true] {
+            assert_eq!([1, 2, 8, 16].map(|step| visit::<f32x16, false>(step, sheared)), [8, 4, 1, 1]);
+            assert_eq!([1, 2, 8, 16].map(|step| visit::<f32x16, true>(step, sheared)), [8, 4, 1, 1]);
+            assert_eq!([1, 2, 8, 16].map(|step| visit::<f64x8, false>(step, sheared)), [16, 8, 2, 1]);
+        }
+    }
 }
