@@ -8,7 +8,7 @@ use std::path::Path;
 
 use common::{Random, ball, soup};
 use glam::{DQuat, DVec3};
-use lanecast::ray::{Counters, Hits, Rays};
+use lanecast::ray::{Counters, Hits, INVALID_ID, PAD, Rays};
 use lanecast::scene::mesh::Mesh;
 use lanecast::scene::world::{Preset, World};
 use lanecast::scene::{ply, unpack};
@@ -243,6 +243,38 @@ fn blocks_of_all_sorts_in_one_batch() {
         }
     }
     assert!(all.hit_count() > 3000, "{}", all.hit_count());
+}
+
+/// Whoever reads whole vectors of hits reads past the last ray.
+#[test]
+fn what_follows_the_last_hit_is_misses() {
+    let corners = [[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]].map(|[x, y]| DVec3::new(x, -1.0, y));
+    let floor = Mesh { positions: corners.into(), triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
+    let scene = compile(vec![ball(20, 30), floor]);
+    let picture = camera(DVec3::new(4.0, 3.0, 5.0), DVec3::ZERO, 0.3, 64);
+    let sorts = [mirrored(&scene, &picture), common::rays(4096, 1), picture];
+    let (mut hits, mut scratch, mut found) = (Hits::default(), Scratch::default(), 0);
+    for (sort, n) in (0..sorts.len()).flat_map(|sort| [1, 15, 43, 250, 1000, 1025, 3999].map(|n| (sort, n))) {
+        let mut rays = Rays::new(n);
+        for i in 0..n {
+            let from = &sorts[sort];
+            rays.set(i, from.org(i), from.dir(i), from.t_min[i], from.t_max[i]);
+        }
+        for name in ["tile", "tile-exact", "tile-16x16", "tile-8x8", "tile-4x4"] {
+            // As after a call for more rays, all of which hit something.
+            hits.reset(n + PAD);
+            hits.prim.fill(0);
+            hits.inst.fill(0);
+            hits.t.fill(0.0);
+            find(name).intersect(&scene, &rays, &mut hits, &mut scratch, None);
+            found += (0..n).filter(|&i| hits.is_hit(i)).count();
+            for i in n..n.next_multiple_of(PAD) {
+                let padding = (hits.t[i], hits.prim[i], hits.inst[i]);
+                assert_eq!(padding, (f32::INFINITY, INVALID_ID, INVALID_ID), "{name}: {n} rays of sort {sort}");
+            }
+        }
+    }
+    assert!(found > 10_000, "{found}");
 }
 
 #[test]
