@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::facets::Facets;
 use super::rounding::Rounding;
 use super::runs::Runs;
-use super::{Kinds, Object, World, instances, primitives, successor};
+use super::{Kinds, Object, Totals, World, instances, primitives, successor};
 use crate::bvh::BuildSettings;
 use crate::error::Result;
 use crate::lanes::Real;
@@ -83,6 +83,7 @@ impl<S: Real> World<S> {
             large: a.large || b.large,
             sorting: a.sorting || b.sorting,
         });
+        let totals = Totals::of(&objects);
         let build_seconds = start.elapsed().as_secs_f64();
         Ok(Self {
             assembly,
@@ -93,6 +94,7 @@ impl<S: Real> World<S> {
             unbounded_instances,
             rounding,
             kinds,
+            totals,
             runs,
             facets,
             counts,

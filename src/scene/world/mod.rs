@@ -12,6 +12,7 @@ mod runs;
 mod solids;
 mod successor;
 mod surface;
+mod totals;
 mod uv;
 
 use std::ops::Range;
@@ -24,6 +25,7 @@ pub use facets::Met;
 pub use rounding::Rounding;
 pub use runs::Place;
 pub use surface::Surface;
+pub use totals::Totals;
 
 use self::facets::Facets;
 use self::runs::Runs;
@@ -201,6 +203,8 @@ pub struct World<S> {
     pub rounding: Rounding,
     /// What objects are made of, taken together.
     pub kinds: Kinds,
+    /// What objects come to.
+    pub totals: Totals,
     /// Per object: its runs.
     runs: Vec<Runs>,
     /// Per object: normals of its shapes and solids.
@@ -272,17 +276,6 @@ impl<S: Real> World<S> {
         !unbounded.is_empty() || !unbounded_solids.is_empty()
     }
 
-    /// Whether shapes and solids make up more of the objects than triangles do, block by block.
-    pub fn is_of_shapes(&self) -> bool {
-        let (mut triangles, mut shapes) = (0, 0);
-        for o in &self.objects {
-            triangles += o.triangles.len();
-            shapes += o.spheres.len() + o.solids.len() + o.unbounded.len();
-            shapes += o.placed.iter().map(Vec::len).sum::<usize>();
-        }
-        shapes > triangles
-    }
-
     /// Finite world bounds (lower and upper corner) of all bounded geometry; `None` if there is none.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let mut all = Aabb::<S>::EMPTY;
@@ -299,7 +292,7 @@ impl<S: Real> World<S> {
 
     /// Entries a traversal stack needs at most, upper tree and object tree together.
     pub fn stack_bound(&self) -> usize {
-        self.top.stack_bound() + self.objects.iter().map(|o| o.tree.stack_bound()).max().unwrap_or(0)
+        self.top.stack_bound() + self.totals.stack_bound
     }
 
     /// Counts and sizes.

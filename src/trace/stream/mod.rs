@@ -136,7 +136,7 @@ impl<S: Real> Job<'_, S> {
         starts: impl Iterator<Item = usize>,
     ) {
         self.memory.waiting.reserve(self.world.stack_bound());
-        if self.world.is_of_shapes() {
+        if self.world.totals.of_shapes {
             self.blocks::<V, ANY, COUNT>(starts);
         } else {
             let (mut sorted, mut some, mut count) = (0, [0; RAYS], 0);

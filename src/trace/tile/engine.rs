@@ -77,8 +77,7 @@ impl Job<'_> {
 
     /// Room for the levels of every way through the world.
     pub fn make_levels(&mut self) {
-        let below = self.world.objects.iter().map(|object| node::levels(&object.tree)).max().unwrap_or(0);
-        let depth = node::levels(&self.world.top) + below + 1;
+        let depth = node::levels(&self.world.top) + self.world.totals.levels + 1;
         if self.memory.levels.len() < depth {
             self.memory.levels.resize(depth, node::Level::default());
         }

@@ -48,7 +48,7 @@ use super::query::{Query, Stack};
 use super::{Generic, Scratch, stream, traverse};
 use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, HitPacket, Packet, Rays};
-use crate::scene::world::{Object, World};
+use crate::scene::world::World;
 use bundle::{Bundle, Shared};
 use columns::{AHEAD, Next};
 use exact::Exact;
@@ -146,17 +146,16 @@ struct Job<'a> {
 /// Whether tiles can trace a world: one object in world space, of triangles only; or (not for `exact` tiles) instances
 /// of more triangles than shapes, that no map makes too flat.
 fn suits(world: &World<f32>, exact: bool) -> bool {
-    // Triangles are numbered by block and place in 32 bits.
-    let fits = |object: &Object<f32>| object.triangles.len() < (u32::MAX / 8) as usize;
     let shape = match world.is_single_object() {
         true => !world.kinds.shapes,
         false => {
             let steep = world.rounding.growth <= place::MOST_GROWTH;
-            let of_shapes = world.kinds.shapes && world.is_of_shapes();
+            let of_shapes = world.kinds.shapes && world.totals.of_shapes;
             steep && !(exact || of_shapes || world.top.nodes.is_empty())
         }
     };
-    shape && !world.kinds.others && world.objects.iter().all(fits)
+    // Triangles are numbered by block and place in 32 bits.
+    shape && !world.kinds.others && world.totals.most_blocks < (u32::MAX / 8) as usize
 }
 
 impl<'a> Job<'a> {
