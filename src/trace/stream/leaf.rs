@@ -294,7 +294,7 @@ mod tests {
         let (mut stack, mut counters) = (Stack::default(), Counters::default());
         let room = Room { waiting: &mut waiting, closer: &mut closer, sifted: &mut sifted };
         let mut walk = Walk::new(&mut best, room, &mut stack, &mut counters, true);
-        let calls = std::cell::Cell::new(0);
+        let (calls, seen) = (std::cell::Cell::new(0), std::cell::Cell::new(0));
         vectors::<V, ANY, false>(&chunk, &mut walk, wanted, |packet, query, lanes| {
             calls.set(calls.get() + 1);
             for k in (0..V::N).filter(|k| lanes >> k & 1 != 0) {
@@ -302,6 +302,8 @@ mod tests {
                 let ([org, dir], [t_min, _], _) = Packet::<V::Scalar>::read(&all, i);
                 let want = Packet::prepared(org, dir, t_min, sheared);
                 assert_eq!(format!("{got:?}"), format!("{want:?}"), "ray {i}");
+                assert_eq!(seen.get() >> i & 1, 0, "ray {i} comes once");
+                seen.set(seen.get() | 1 << i);
             }
             // Every other one of the rays hits where it starts.
             let hits = |k: usize| (packet.org[0].lane(k).to_f64() as usize).is_multiple_of(2 * step);
@@ -309,6 +311,7 @@ mod tests {
             let found = Candidate { hit: V::Mask::from_bits(hit), t: packet.t_min, u: packet.org[0], v: packet.dir[1] };
             query.take(lanes, &found, 7, 3);
         });
+        assert_eq!(seen.get(), wanted);
         for i in 0..RAYS {
             let hits = wanted >> i & 1 != 0 && i % (2 * step) == 0;
             if ANY {
