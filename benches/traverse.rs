@@ -7,7 +7,7 @@ mod common;
 
 use std::borrow::Cow;
 
-use common::{Scene, soup, terrain};
+use common::{Scene, crowd, soup, terrain};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use lanecast::measure::answers::Answers;
 use lanecast::measure::eye::View;
@@ -91,7 +91,7 @@ fn scene<S: Engines>(criterion: &mut Criterion, scene: &Scene) {
 }
 
 fn all(criterion: &mut Criterion) {
-    for made in [terrain(100), soup(20_000)] {
+    for made in [terrain(100), soup(20_000), crowd(2000)] {
         scene::<f32>(criterion, &made);
         scene::<f64>(criterion, &made);
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 use lanecast::lanes::Real;
 use lanecast::ray::Hits;
-use lanecast::scene::description::{CameraDescription, Description, Item, ItemKind, Light, Projection};
+use lanecast::scene::description::{CameraDescription, Description, Group, Item, ItemKind, Light, Projection};
 use lanecast::scene::mesh::Mesh;
 
 /// splitmix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
@@ -83,6 +83,27 @@ pub fn soup(n: u32) -> Scene {
         mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
     }
     scene("soup", mesh, DVec3::new(12.0, 3.0, 2.0), DVec3::ZERO)
+}
+
+/// Many objects: `n` octahedra, no two alike, each placed once, in a cube seen from outside. What a call of an engine does for each
+/// object, whatever its rays, shows here.
+pub fn crowd(n: u32) -> Scene {
+    let mut r = Random(1);
+    let mut crowd = scene("crowd", octahedron(0.2), DVec3::new(12.0, 3.0, 2.0), DVec3::ZERO);
+    let Description { meshes, groups, .. } = &mut crowd.description;
+    for i in 1..=n {
+        meshes.push(Arc::new(octahedron(0.1 + 0.1 * r.unit())));
+        let item = |kind, transform| Item { transform, material: None, kind };
+        groups.push(Group { items: vec![item(ItemKind::Mesh(i), DAffine3::IDENTITY)], ..Group::default() });
+        groups[0].items.push(item(ItemKind::Instance(i), DAffine3::from_translation(r.cube() * 5.0)));
+    }
+    crowd
+}
+
+fn octahedron(size: f64) -> Mesh {
+    let positions = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z].map(|p| p * size).into();
+    let half = |apex| [[0, 2, apex], [2, 1, apex], [1, 3, apex], [3, 0, apex]];
+    Mesh { positions, triangles: [half(4), half(5)].concat(), ..Mesh::default() }
 }
 
 /// Bits of one answer: t, u, v and the ids.

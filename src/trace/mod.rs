@@ -223,7 +223,7 @@ impl<V: Lanes, const TREE: bool> Generic<V, TREE> {
         }
     }
 
-    /// Any-hit, the rays from `first` on: as many as `out` has places for.
+    /// Any-hit, the rays from `first` on: as many as `out` has places for. Not inlined: streams call it too, and are to be as fast.
     #[inline(never)]
     fn any<const COUNT: bool>(
         world: &World<V::Scalar>,
