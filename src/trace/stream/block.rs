@@ -306,3 +306,49 @@ impl<S: Real> Job<'_, S> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Stream;
+    use crate::lanes::{Lanes, Real, f32x16, f64x8};
+    use crate::math::Random;
+    use crate::ray::Rays;
+    use crate::scene::load::{LoadOptions, load};
+    use crate::scene::world::{Preset, World};
+    use crate::trace::{Engine, Engines, Scratch, engine};
+    use std::marker::PhantomData;
+
+    /// Any-hit rays in all directions among shapes, in one call and behind others that point one way: how many meet something.
+    fn turned<V: Lanes>(seed: u64) -> usize
+    where
+        V::Scalar: Engines,
+    {
+        let scene = load("builtin:gallery", &LoadOptions::default()).unwrap();
+        let world = World::<V::Scalar>::compile(&scene, Preset::Balanced).unwrap();
+        assert!(world.totals.of_shapes);
+        let (mut r, mut met, mut scratch) = (Random(seed), 0, Scratch::default());
+        for (n, alike) in [(1000, 0), (1000, 300), (43, 0), (777, 512), (256, 0)] {
+            let mut rays = Rays::<V::Scalar>::new(n);
+            for i in 0..n {
+                let mut unit = || 2.0 * r.unit() - 1.0;
+                let (org, dir) = ([6.0 * unit(), 1.0 + unit(), 6.0 * unit()], [unit(), unit(), unit()]);
+                let dir = if i < alike { [0.3, -0.5, -1.0] } else { dir };
+                let number = V::Scalar::from_f64;
+                rays.set(i, org.map(number), dir.map(number), number(0.0), number(4.0));
+            }
+            let (mut got, mut want) = (vec![7; n], Vec::new());
+            Stream::<V>(PhantomData).occluded(&world, &rays, &mut got, &mut scratch, None);
+            assert!(V::Scalar::memory(&mut scratch).stream.block.turned, "{n} rays, {alike} alike");
+            engine::<V::Scalar>("scalar").unwrap().occluded(&world, &rays, &mut want, &mut scratch, None);
+            assert_eq!(got, want, "{n} rays, {alike} alike");
+            met += want.iter().filter(|&&met| met == 1).count();
+        }
+        met
+    }
+
+    #[test]
+    fn rays_in_all_directions_meet_what_they_meet_alone() {
+        let (single, double) = (turned::<f32x16>(3), turned::<f64x8>(4));
+        assert!((500..2500).contains(&single) && (500..2500).contains(&double), "{single} {double}");
+    }
+}
