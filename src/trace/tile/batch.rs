@@ -235,19 +235,21 @@ impl Batch {
     }
 
     /// Set-up for segments that start anywhere. Not from the corners in the frame: theirs is another normal, if the triangle
-    /// is a needle.
+    /// is a needle. Returns the triangles that some segment may start behind.
     #[inline(always)]
-    fn set_up_side(&self, groups: &Groups, planes: &mut Planes) {
+    fn set_up_side(&self, groups: &Groups, planes: &mut Planes) -> u32 {
         let (corner, sides) = self.sides(groups);
         let normal = cross_accurate(sides[0], sides[1]);
         let from_apex = each(|a| corner[a] - V::splat(groups.frame.apex[a] * groups.frame.scale));
         let volume = dot(normal, from_apex);
         let back = volume.cmp_lt(V::constant(0.0));
-        let side = corner.into_iter().chain(map3(normal, |x| select(back, -x, x)));
+        let normal = map3(normal, |x| select(back, -x, x));
+        let side = corner.into_iter().chain(normal);
         planes.side.iter_mut().zip(side).for_each(|(to, x)| x.store(to));
         let (size, products) = (volume.abs(), dot(map3(normal, V::abs), map3(from_apex, V::abs)));
         (V::constant(1.0) / size).store(&mut planes.rcp);
         planes.flat = size.cmp_le(products * V::splat(LEAST_DISTANCE)).bits();
+        groups.starts.as_ref().map_or(u32::MAX, |starts| starts.some_behind(corner, normal))
     }
 
     /// Set-up for the tile's own answers.
@@ -262,8 +264,9 @@ impl Batch {
         let volume = dot(normal, p[0]);
         let (zero, one) = (V::constant(0.0), V::constant(1.0));
         let rcp = one / volume;
+        let mut reached = u32::MAX;
         if ANY || groups.is_behind {
-            self.set_up_side(groups, planes);
+            reached = self.set_up_side(groups, planes);
         }
         // Over the volume an edge function is positive on the side that faces the apex, and the corner's weight times 1/z.
         let each_inverse = map3(*p, |q| one / q[2]);
@@ -292,7 +295,7 @@ impl Batch {
         planes.corners = map3(*p, |q| map3(q, V::to_array));
         let own = |inverse: V| nearest.fast_min(farthest.fast_max(inverse));
         let [e0, e1, e2] = edges;
-        planes.store(groups, &[e0, e1, e2, map3(normal, |n| n * rcp)], eps, own) & in_front | planes.wild
+        planes.store(groups, &[e0, e1, e2, map3(normal, |n| n * rcp)], eps, own) & in_front & reached | planes.wild
     }
 }
 

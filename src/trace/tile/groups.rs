@@ -7,6 +7,7 @@ use super::frame::Frame;
 use super::lines::Lines;
 use super::listing;
 use super::presumed::Look;
+use super::starts::Starts;
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::minima::{quarter_minima, quarters, row_minima_of};
 use crate::lanes::words::{greatest, least};
@@ -89,6 +90,8 @@ pub struct Groups {
     behind: [V; GROUPS],
     /// Own answers: which part of the way from that point to the best hit is ahead of the start.
     pub ahead: [V; GROUPS],
+    /// Of a full tile of segments to a common end: where they start.
+    pub starts: Option<Starts>,
     /// Surely no segment starts nearer than at this depth.
     pub front: f32,
     /// Relative error of depths computed from a ray's parameter.
@@ -136,6 +139,7 @@ impl Default for Groups {
             ends: [V::splat(0.0); SET],
             behind: [V::splat(0.0); GROUPS],
             ahead: [V::splat(0.0); GROUPS],
+            starts: None,
             front: 0.0,
             loose: 0.0,
             rect: [[zero; 2]; 2],
@@ -272,6 +276,7 @@ impl Groups {
                 }
             }
         }
+        self.starts = (full && ANY && bundle.shared != Shared::Start).then(|| Starts::of(&self.of[..N * SET]));
         self.endless = whole == all;
         self.ends_early = least(near) < f32::INFINITY;
         if self.ends_early && !EXACT {

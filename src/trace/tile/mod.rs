@@ -40,6 +40,7 @@ mod presumed;
 mod shapes;
 mod slab;
 mod spans;
+mod starts;
 mod walk;
 mod written;
 
