@@ -26,6 +26,10 @@ pub use all::{Stretch, stretches};
 use query::{Query, Stack};
 pub use void::is_void;
 
+/// Whether engines count what they do even if nobody asks. When the library's parts are tested they do: kernels that do not count
+/// are the same source, and to compile both again takes minutes. Tests of the whole program run these.
+const ALWAYS_COUNTS: bool = cfg!(test);
+
 /// Per-thread working memory of engines; grows on use, reusable for any world.
 #[derive(Debug, Default)]
 pub struct Scratch {
@@ -264,9 +268,11 @@ where
         hits.reset(rays.len());
         let stack = &mut V::Scalar::memory(scratch).stack;
         stack.reserve(world.stack_bound());
-        match counters {
-            Some(counters) => Self::closest::<true>(world, rays, hits, stack, counters),
-            None => Self::closest::<false>(world, rays, hits, stack, &mut Counters::default()),
+        let (mut unread, count) = (Counters::default(), ALWAYS_COUNTS || counters.is_some());
+        let counters = counters.unwrap_or(&mut unread);
+        match count {
+            true => Self::closest::<true>(world, rays, hits, stack, counters),
+            false => Self::closest::<false>(world, rays, hits, stack, counters),
         }
     }
 
@@ -282,9 +288,11 @@ where
         out.resize(rays.len(), 0);
         let stack = &mut V::Scalar::memory(scratch).stack;
         stack.reserve(world.stack_bound());
-        match counters {
-            Some(counters) => Self::any::<true>(world, (rays, 0), out, stack, counters),
-            None => Self::any::<false>(world, (rays, 0), out, stack, &mut Counters::default()),
+        let (mut unread, count) = (Counters::default(), ALWAYS_COUNTS || counters.is_some());
+        let counters = counters.unwrap_or(&mut unread);
+        match count {
+            true => Self::any::<true>(world, (rays, 0), out, stack, counters),
+            false => Self::any::<false>(world, (rays, 0), out, stack, counters),
         }
     }
 }

@@ -35,7 +35,7 @@ use std::marker::PhantomData;
 
 use super::output::Output;
 use super::query::{Query, Stack};
-use super::{Engine, Engines, Scratch, traverse};
+use super::{ALWAYS_COUNTS, Engine, Engines, Scratch, traverse};
 use crate::lanes::rows::{Row, to_rows};
 use crate::lanes::words::{prefetch, transpose_bits};
 use crate::lanes::{Lanes, Real};
@@ -390,8 +390,8 @@ fn call<V: Lanes, const ANY: bool>(
     // Hits of the padding are misses, whoever reads whole vectors of them.
     let end = if ANY { rays.len() } else { rays.padded_len() };
     let starts = (0..end).step_by(V::N);
-    let (mut uncounted, count) = (Counters::default(), counters.is_some());
-    let counters = counters.unwrap_or(&mut uncounted);
+    let (mut unread, count) = (Counters::default(), ALWAYS_COUNTS || counters.is_some());
+    let counters = counters.unwrap_or(&mut unread);
     let mut job = Job { world, rays, memory, stack, counters, output, apart: false, plain: false };
     match count {
         true => job.run::<V, ANY, true>(starts),

@@ -7,7 +7,7 @@ use crate::lanes::{Lanes, f32x16};
 use crate::ray::{Counters, Hits, Pencil, Rays};
 use crate::scene::world::World;
 use crate::trace::output::Output;
-use crate::trace::{Engine, Scratch};
+use crate::trace::{ALWAYS_COUNTS, Engine, Scratch};
 
 impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
     fn name(&self) -> &'static str {
@@ -44,12 +44,12 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
     ) -> bool {
         hits.prepare(pencil.len());
         let (none, output) = (&Rays::default(), Output::Closest(hits));
-        match counters {
-            Some(counters) => Job::new(world, none, scratch, counters, output, self.most).pencil::<EXACT, true>(pencil),
-            None => {
-                let counters = &mut Counters::default();
-                Job::new(world, none, scratch, counters, output, self.most).pencil::<EXACT, false>(pencil)
-            }
+        let (mut unread, count) = (Counters::default(), ALWAYS_COUNTS || counters.is_some());
+        let counters = counters.unwrap_or(&mut unread);
+        let mut job = Job::new(world, none, scratch, counters, output, self.most);
+        match count {
+            true => job.pencil::<EXACT, true>(pencil),
+            false => job.pencil::<EXACT, false>(pencil),
         }
     }
 
@@ -112,10 +112,11 @@ fn call<const ANY: bool, const EXACT: bool>(
     counters: Option<&mut Counters>,
     most: usize,
 ) {
-    match counters {
-        Some(counters) => Job::new(world, rays, scratch, counters, output, most).run::<ANY, EXACT, true>(),
-        None => {
-            Job::new(world, rays, scratch, &mut Counters::default(), output, most).run::<ANY, EXACT, false>();
-        }
+    let (mut unread, count) = (Counters::default(), ALWAYS_COUNTS || counters.is_some());
+    let counters = counters.unwrap_or(&mut unread);
+    let mut job = Job::new(world, rays, scratch, counters, output, most);
+    match count {
+        true => job.run::<ANY, EXACT, true>(),
+        false => job.run::<ANY, EXACT, false>(),
     }
 }
