@@ -20,7 +20,8 @@ pub const START_ROUNDINGS: f64 = 8.0;
 pub const MAX_DIFFERING: f64 = 1e-4;
 
 /// Largest share of rays that may differ in a row that gets a figure although more than [`MAX_DIFFERING`] do, because the oracle
-/// explains both answers to each of them: in instances starts are rounded on the way in, and near hits at a flat angle move far.
+/// explains our answer to each of them and the peer's to all but [`MAX_DIFFERING`]: in instances starts are rounded on the way in, and
+/// near hits at a flat angle move far.
 pub const MAX_EXPLAINED: f64 = 1e-3;
 
 /// How a peer's answers compare with ours.
@@ -49,9 +50,12 @@ impl Agreement {
         self.differences() as f64 <= MAX_DIFFERING * self.rays as f64
     }
 
-    /// Whether a figure may be quoted if `explained`: the oracle explains both answers to each ray that differs.
-    pub fn passes_if(&self, explained: impl FnOnce() -> bool) -> bool {
-        self.passes() || self.differences() as f64 <= MAX_EXPLAINED * self.rays as f64 && explained()
+    /// Whether a figure may be quoted. `rejected`: of the answers to rays that differ, how many of the peer's the oracle does not
+    /// explain, or `None` if it is one of ours.
+    pub fn passes_if(&self, rejected: impl FnOnce() -> Option<u64>) -> bool {
+        let few = |count: u64, share: f64| count as f64 <= share * self.rays as f64;
+        self.passes()
+            || few(self.differences(), MAX_EXPLAINED) && rejected().is_some_and(|count| few(count, MAX_DIFFERING))
     }
 }
 
@@ -171,8 +175,10 @@ mod tests {
     #[test]
     fn one_in_a_thousand_may_differ_if_the_oracle_explains_it() {
         let at = |differing| Agreement { rays: 20_000, differing: (0..differing).collect(), ..Default::default() };
-        assert!(at(3).passes_if(|| true) && at(20).passes_if(|| true));
-        assert!(!at(3).passes_if(|| false) && !at(21).passes_if(|| true));
+        assert!(at(3).passes_if(|| Some(0)) && at(20).passes_if(|| Some(0)));
+        assert!(!at(3).passes_if(|| None) && !at(21).passes_if(|| Some(0)));
+        // No more that it does not explain than may differ anyway.
+        assert!(at(20).passes_if(|| Some(2)) && !at(20).passes_if(|| Some(3)));
         assert!(at(2).passes_if(|| unreachable!("nobody asks the oracle for what passes anyway")));
     }
 

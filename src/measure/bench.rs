@@ -251,7 +251,8 @@ impl<S: Engines> Subject<'_, S> {
         }
     }
 
-    /// A peer's answers, if all but a handful are ours up to rounding, or the oracle explains both where they are not.
+    /// A peer's answers, if all but a handful are ours up to rounding, or the oracle explains ours and all but a handful of them where
+    /// they are not.
     fn admit_peer(&self, peer: &dyn Peer<S>, batches: &[Rays<S>], scalar: &Answers<S>) -> Admission<S> {
         let mut answers = scalar.clone();
         self.workers.peer_pass(peer, batches, &mut answers);
@@ -259,15 +260,16 @@ impl<S: Engines> Subject<'_, S> {
         let mut why = String::new();
         let passes = agreement.passes_if(|| {
             let both = [scalar, &answers];
-            let explained =
-                self.workers.install(|| truth::explain_both(self.oracle, batches, both, &agreement.differing));
-            why = explained.as_ref().err().cloned().unwrap_or_default();
-            explained.is_ok()
+            let judged = self.workers.install(|| truth::judge_both(self.oracle, batches, both, &agreement.differing));
+            let [ours, theirs] = judged.each_ref().map(|counts| counts.unexplained);
+            if let Some(first) = judged.iter().find_map(|counts| counts.samples.first()) {
+                why = format!("; the oracle rejects {ours} of our answers and {theirs} of the peer's to them, {first}");
+            }
+            (ours == 0).then_some(theirs)
         });
         match &agreement.first {
             Some(first) if !passes => {
                 let (count, rays) = (agreement.differences(), agreement.rays);
-                let why = if why.is_empty() { why } else { format!("; {why}") };
                 Err(Box::new(Outcome::Wrong(format!("{count} of {rays} rays differ from scalar, {first}{why}"))))
             }
             _ => Ok((answers, agreement)),

@@ -99,24 +99,17 @@ pub fn admit<'o, S: Engines>(
     }
 }
 
-/// Whether the oracle explains what `scalar` and a peer answered to each of the rays called `numbers`, on which they differ by
-/// more than they should: then neither is wrong, and what differs is the rounding of either. A peer's arithmetic is its own, so its
-/// margin is that of such engines.
-///
-/// # Errors
-/// The first answer of the two that it does not explain, in words.
-pub fn explain_both<S: Engines>(
+/// Judges what `scalar` and a peer answered to each of the rays called `numbers`, on which they differ by more than they should: what
+/// the oracle explains is not wrong, and what differs is the rounding of either. A peer's arithmetic is its own, so its margin is
+/// that of such engines.
+pub fn judge_both<S: Engines>(
     oracle: &Oracle,
     batches: &[Rays<S>],
     [scalar, peer]: [&Answers<S>; 2],
     numbers: &[u64],
-) -> Result<(), String> {
-    let judged = [(scalar, MARGIN_FACTOR), (peer, OWN_MARGIN_FACTOR)]
-        .map(|(answers, factor)| judge_rays(oracle, factor, batches, answers, numbers));
-    match judged.iter().find_map(|counts| counts.samples.first()) {
-        None => Ok(()),
-        Some(first) => Err(format!("the oracle rejects {first}")),
-    }
+) -> [Counts; 2] {
+    [(scalar, MARGIN_FACTOR), (peer, OWN_MARGIN_FACTOR)]
+        .map(|(answers, factor)| judge_rays(oracle, factor, batches, answers, numbers))
 }
 
 /// Judges the rays called `numbers` (counted through the batches, ascending), see [`judge`].
@@ -237,7 +230,7 @@ mod tests {
 
     /// As above: the third ray's answer is a rounding off in one list and wrong in the other.
     #[test]
-    fn both_answers_must_be_explained() {
+    fn both_answers_are_judged() {
         let oracle = floor();
         let batches = crate::measure::testing::falling_rays::<f32>(&[2, 1]);
         let answers = |third: f32| {
@@ -248,17 +241,21 @@ mod tests {
             Answers::Closest(hits.to_vec())
         };
         let (right, rounded, wrong) = (answers(3.0), answers(3.0f32.next_up()), answers(3.001));
-        let explained = |pair: [&Answers<f32>; 2], numbers: &[u64]| explain_both(&oracle, &batches, pair, numbers);
-        assert_eq!(explained([&right, &rounded], &[2]), Ok(()));
-        for pair in [[&right, &wrong], [&wrong, &right]] {
-            let why = explained(pair, &[0, 2]).unwrap_err();
-            assert!(why.starts_with("the oracle rejects ray 2: "), "{why}");
-            assert_eq!(explained(pair, &[0, 1]), Ok(()), "only the rays that are asked for");
+        let judged = |pair: [&Answers<f32>; 2], numbers: &[u64]| judge_both(&oracle, &batches, pair, numbers);
+        let rejected =
+            |pair: [&Answers<f32>; 2], numbers: &[u64]| judged(pair, numbers).map(|counts| counts.unexplained);
+        assert_eq!(rejected([&right, &rounded], &[2]), [0, 0]);
+        for (pair, want) in [([&right, &wrong], [0, 1]), ([&wrong, &right], [1, 0])] {
+            assert_eq!(rejected(pair, &[0, 2]), want);
+            let counts = judged(pair, &[0, 2]);
+            let why = counts.iter().find_map(|counts| counts.samples.first()).unwrap();
+            assert!(why.starts_with("ray 2: "), "{why}");
+            assert_eq!(rejected(pair, &[0, 1]), [0, 0], "only the rays that are asked for");
         }
         // How many ulps either may be off.
         let off = |n: u32| answers(f32::from_bits(3.0f32.to_bits() + n));
-        let ours = (1..1000).take_while(|&n| explained([&off(n), &right], &[2]).is_ok()).count();
-        let theirs = (1..1000).take_while(|&n| explained([&right, &off(n)], &[2]).is_ok()).count();
+        let ours = (1..1000).take_while(|&n| rejected([&off(n), &right], &[2]) == [0, 0]).count();
+        let theirs = (1..1000).take_while(|&n| rejected([&right, &off(n)], &[2]) == [0, 0]).count();
         assert!(ours > 0 && (2 * ours..=4 * ours).contains(&theirs), "{ours} and {theirs} ulps");
     }
 }
