@@ -46,6 +46,7 @@ struct Report<'a> {
 struct Counts {
     objects: u64,
     instances: u64,
+    joined: u64,
     primitives: u64,
     instanced_primitives: u64,
     dropped_nonfinite: u64,
@@ -122,6 +123,7 @@ fn report<'a, S: Engines>(scene: &'a str, description: &'a Description, world: &
         counts: Counts {
             objects: stats.objects,
             instances: stats.instances,
+            joined: stats.joined,
             primitives: stats.prims,
             instanced_primitives: stats.instanced_prims,
             dropped_nonfinite: stats.dropped_nonfinite,
@@ -162,7 +164,11 @@ fn text(report: &Report<'_>) -> String {
         ("scene", format!("{} ({})", report.scene, report.name)),
         ("hash", report.hash.into()),
         ("precision", report.precision.into()),
-        ("objects", format!("{}, placed {} times", counts.objects, counts.instances)),
+        ("objects", {
+            let joined =
+                if counts.joined > 0 { format!(", {} traced as one mesh", counts.joined) } else { String::new() };
+            format!("{}, placed {} times{joined}", counts.objects, counts.instances)
+        }),
         ("primitives", format!("{}, {} counting every instance", counts.primitives, counts.instanced_primitives)),
         ("dropped", format!("{} not finite, {} without area", counts.dropped_nonfinite, counts.dropped_degenerate)),
         ("materials", format!("{}, {} of them emit light", counts.materials, counts.emissive_materials)),

@@ -52,7 +52,7 @@ impl Solids {
         }
         let world = World::<f64>::compile(&kept, Preset::Balanced)?;
         if let Some(i) = world.instances.iter().position(|i| !i.bounds.is_bounded() && !i.bounds.is_empty()) {
-            let name = &world.assembly.objects[world.instances[i].object as usize].name;
+            let name = &world.traced.objects[world.instances[i].object as usize].name;
             let place = if name.is_empty() { String::new() } else { format!(" in `{name}`") };
             return Err(Error::Usage(format!(
                 "a plane, a half-space or a complement{place} has no bounds, so no closed surface; choose others with \

@@ -80,7 +80,7 @@ pub fn scene<S: Engines>(
         build_seconds: stats.build_seconds,
         bytes: stats.node_bytes + stats.prim_bytes,
     };
-    let guests = plan.peers.open::<S>(&world.assembly, workers)?;
+    let guests = plan.peers.open(&world, workers)?;
     let costs = explain::is_of_triangles(&world).then(|| workers.install(explain::costs::<S>));
     let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests, costs };
     for &kind in &plan.kinds {

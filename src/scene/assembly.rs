@@ -76,6 +76,13 @@ pub struct Placement {
     pub to_world: DAffine3,
 }
 
+impl Placement {
+    /// Whether the object's space is the world's.
+    pub fn stands(&self) -> bool {
+        self.to_world == DAffine3::IDENTITY
+    }
+}
+
 impl Assembly {
     /// Lowers `description`.
     ///

@@ -53,6 +53,8 @@ pub struct Description {
     pub environment: Option<Environment>,
     /// Ambient radiance (first-light Whitted model), linear Rec.709.
     pub ambient: DVec3,
+    /// Instances are no more than the format's way to place a mesh: they may be traced as one mesh.
+    pub joins: bool,
     /// Precision this scene asks for (`None`: f32).
     pub precision: Option<Precision>,
     /// Looks of a BRL-CAD database's regions, which only its own lighting model knows; object 0 has a part for each.
@@ -172,6 +174,7 @@ impl Description {
             background: DVec3::ZERO,
             environment: None,
             ambient: DVec3::splat(0.1),
+            joins: false,
             precision: None,
             looks: None,
             parameters: Vec::new(),

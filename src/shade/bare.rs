@@ -37,7 +37,7 @@ impl<S: Real> Bare<S, EDGES> {
     }
 }
 
-/// Bare triangles by primitive number, where the world is one object of moderate size and there are
+/// Bare triangles by primitive number, where the world is one placed object of moderate size and there are
 /// rays enough; others are worked out hit by hit.
 #[derive(Debug, Default)]
 pub struct BareTriangles<S> {
@@ -48,7 +48,8 @@ impl<S: Real> BareTriangles<S> {
     /// Those of `world`, which `rays` primary rays are to be traced through.
     pub fn new(world: &World<S>, looks: &Looks<'_>, rays: u64) -> Self {
         let count = world.assembly.objects.first().map_or(0, |object| object.prim_count);
-        if !world.is_single_object() || count > MAX_KEPT || 2 * u64::from(count) > rays {
+        let is_one = world.is_single_object() && world.names.is_none();
+        if !is_one || count > MAX_KEPT || 2 * u64::from(count) > rays {
             return Self { kept: Vec::new() };
         }
         let other = Bare { numbers: [S::ZERO; KEPT], material: OTHER };

@@ -98,7 +98,10 @@ impl<V: Lanes> Job<'_, V> {
                 true => self.packet,
                 false => self.packet.into_local(&instance.to_local, interval.near),
             };
-            self.object(&world.objects[instance.object as usize], &packet, lanes, inst as u32);
+            let inst = inst as u32;
+            // Meshes alone are traced as one object with others.
+            let inst = world.names.as_ref().map_or(inst, |names| names.of(0, inst)[1]);
+            self.object(&world.objects[instance.object as usize], &packet, lanes, inst);
         }
     }
 

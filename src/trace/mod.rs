@@ -23,6 +23,7 @@ use crate::lanes::{Lanes, Pair, Real, f32x4, f32x8, f32x16, f64x2, f64x4, f64x8}
 use crate::ray::{Counters, HitPacket, Hits, Packet, Pencil, Rays};
 use crate::scene::world::{Compiles, World};
 pub use all::{Stretch, stretches};
+use output::Output;
 use query::{Query, Stack};
 pub use void::is_void;
 
@@ -223,7 +224,7 @@ impl<V: Lanes, const TREE: bool> Generic<V, TREE> {
     ) {
         for first in (0..rays.len()).step_by(V::N) {
             let (hit, _) = Self::packet::<false, COUNT>(world, rays, first, stack, counters);
-            hit.store(hits, first);
+            Output::Closest(hits, world.names.as_ref()).put(first, &hit, 0);
         }
     }
 

@@ -3,11 +3,12 @@
 use crate::lanes::words::prefetch;
 use crate::lanes::{Lanes, Real};
 use crate::ray::{HitPacket, Hits};
+use crate::scene::world::Names;
 
 /// The answers of one call. Shape: one per ray of the batch.
 pub enum Output<'a, S> {
-    /// Closest hits.
-    Closest(&'a mut Hits<S>),
+    /// Closest hits, and what they are called if not what engines call them.
+    Closest(&'a mut Hits<S>, Option<&'a Names>),
     /// Any-hit: 1 is occluded.
     Any(&'a mut [u8]),
 }
@@ -16,7 +17,7 @@ impl<S: Real> Output<'_, S> {
     /// The same for a callee.
     pub fn reborrow(&mut self) -> Output<'_, S> {
         match self {
-            Self::Closest(hits) => Output::Closest(hits),
+            Self::Closest(hits, names) => Output::Closest(hits, *names),
             Self::Any(out) => Output::Any(out),
         }
     }
@@ -25,7 +26,12 @@ impl<S: Real> Output<'_, S> {
     #[inline(always)]
     pub fn put<V: Lanes<Scalar = S>>(&mut self, first: usize, hit: &HitPacket<V>, done: u32) {
         match self {
-            Self::Closest(hits) => hit.store(hits, first),
+            Self::Closest(hits, names) => {
+                let Some(names) = names else { return hit.store(hits, first) };
+                let mut hit = *hit;
+                names.apply(&mut hit.prim, &mut hit.inst);
+                hit.store(hits, first);
+            }
             Self::Any(_) => self.put_any(first, V::N, done),
         }
     }
@@ -33,7 +39,7 @@ impl<S: Real> Output<'_, S> {
     /// Asks the memory for the place of the answer of ray `first` and its neighbours.
     #[inline(always)]
     pub fn prefetch(&self, first: usize) {
-        if let Self::Closest(hits) = self {
+        if let Self::Closest(hits, _) = self {
             [&hits.t, &hits.u, &hits.v].into_iter().for_each(|array| prefetch(array, first));
             [&hits.prim, &hits.inst].into_iter().for_each(|array| prefetch(array, first));
         }

@@ -7,6 +7,7 @@ mod common;
 
 mod determinism;
 mod frames;
+mod joined;
 mod offsets;
 mod progressive;
 mod shading;

@@ -7,5 +7,6 @@ mod tile_support;
 
 mod engine;
 mod instances;
+mod joined;
 mod order;
 mod pencil;

@@ -49,7 +49,7 @@ pub fn quality<S: Real>(world: &World<S>) -> Option<Quality> {
     }
     let basic = object.tree.quality();
     let mut found = Quality {
-        object: world.assembly.objects[index].name.clone(),
+        object: world.traced.objects[index].name.clone(),
         prims: basic.prims,
         nodes: basic.nodes,
         leaves: basic.leaves,
@@ -85,7 +85,7 @@ struct Surface {
 impl Surface {
     fn of<S: Real>(world: &World<S>, index: usize) -> Self {
         let (mut corners, mut areas, mut sum) = (Vec::new(), Vec::new(), 0.0);
-        for part in &world.assembly.objects[index].parts {
+        for part in &world.traced.objects[index].parts {
             let PartKind::Mesh(mesh) = &part.kind else { continue };
             for i in 0..mesh.triangles.len() {
                 let [a, b, c] = mesh.corners(i).map(|p| part.to_object.transform_point3(p));

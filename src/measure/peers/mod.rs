@@ -24,7 +24,7 @@ use crate::lanes::Real;
 use crate::measure::raysets::Query;
 use crate::measure::timing::Workers;
 use crate::ray::{Hits, Rays};
-use crate::scene::assembly::Assembly;
+use crate::scene::world::World;
 use triangles::{PlacedTriangles, Triangles};
 
 /// What `--peers` takes.
@@ -102,19 +102,20 @@ impl Invitation {
         })
     }
 
-    /// Builds every peer's scene from the triangles of `assembly` (and its instances, if it knows them), with as many threads as `workers` has. To be called
-    /// from a thread that is not pinned to a core: Embree's build threads inherit where they may run.
+    /// Builds every peer's scene from the triangles of `world` (and its instances, those that are instances to our engines too, if
+    /// it knows them), with as many threads as `workers` has. To be called from a thread that is not pinned to a core: Embree's build threads inherit where they may run.
     ///
     /// # Errors
     /// Those of [`Invitation::check`]. A peer that cannot take part is no error but a [`Guest`] that says why.
-    pub fn open<S: Real>(&self, assembly: &Assembly, workers: &Workers) -> Result<Vec<Guest<S>>> {
+    pub fn open<S: Real>(&self, world: &World<S>, workers: &Workers) -> Result<Vec<Guest<S>>> {
         self.check()?;
         if self.names.is_empty() {
             return Ok(Vec::new());
         }
         let wanted = |embree: bool| self.names.iter().any(|name| name.starts_with("embree") == embree);
-        let flat = if wanted(false) { Triangles::flatten(assembly) } else { Ok(Triangles::default()) };
-        let placed = if wanted(true) { PlacedTriangles::of(assembly) } else { Ok(PlacedTriangles::default()) };
+        let flat = if wanted(false) { Triangles::flatten(&world.assembly) } else { Ok(Triangles::default()) };
+        let of_world = || PlacedTriangles::of(&world.traced, world.names.as_ref());
+        let placed = if wanted(true) { of_world() } else { Ok(PlacedTriangles::default()) };
         let placed = placed.map(Arc::new);
         let with = |build: &(dyn Fn(&Triangles) -> Modes + Sync)| {
             let triangles = flat.as_ref().map_err(Clone::clone)?;

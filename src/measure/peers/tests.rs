@@ -10,7 +10,7 @@ use crate::measure::agreement::compare;
 use crate::measure::answers::Answers;
 use crate::scene::description::{Description, Group, Item, ItemKind};
 use crate::scene::mesh::Mesh;
-use crate::scene::world::{Preset, World};
+use crate::scene::world::{Compiles, Preset, World};
 use crate::trace::engine;
 
 /// 3000 triangles, once as they are and once turned, moved and scaled.
@@ -66,7 +66,7 @@ fn agree(scene: &Description, invitation: &Invitation, threads: usize) -> std::r
     let (world, batches) = (World::<f32>::compile(scene, Preset::Fast).unwrap(), rays());
     let scalar = engine::<f32>("scalar").unwrap();
     let mut count = 0;
-    for guest in invitation.open::<f32>(&world.assembly, &workers).unwrap() {
+    for guest in invitation.open(&world, &workers).unwrap() {
         for peer in guest.modes? {
             let what = format!("{} {}", peer.facts().name, peer.facts().mode);
             assert!(peer.facts().bytes > 100_000 && peer.facts().build_seconds > 0.0, "{what}: {:?}", peer.facts());
@@ -152,11 +152,11 @@ fn every_mode_of_embree_finds_what_scalar_finds() {
 }
 
 /// Why the only guest of `names` has no mode.
-fn refusal<S: Real>(scene: &Description, names: &[&str], library: &str) -> String {
+fn refusal<S: Compiles>(scene: &Description, names: &[&str], library: &str) -> String {
     let invitation =
         Invitation { names: names.iter().map(|name| name.to_string()).collect(), embree: Some(PathBuf::from(library)) };
-    let assembly = Assembly::new(scene).unwrap();
-    let guests = invitation.open::<S>(&assembly, &Workers::new(1).unwrap()).unwrap();
+    let world = World::<S>::compile(scene, Preset::Fast).unwrap();
+    let guests = invitation.open(&world, &Workers::new(1).unwrap()).unwrap();
     guests.into_iter().next().unwrap().modes.err().unwrap()
 }
 

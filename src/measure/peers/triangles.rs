@@ -7,6 +7,7 @@ use glam::{DAffine3, DVec3};
 
 use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind};
 use crate::scene::mesh::Mesh;
+use crate::scene::world::Names;
 use crate::shape::Triangle;
 
 /// Most triangles (counted once per instance, for peers without instances) and instances together that a peer is given:
@@ -110,11 +111,11 @@ pub struct PlacedObject {
 }
 
 impl PlacedTriangles {
-    /// The triangles of a world.
+    /// The triangles of what a world traces, `assembly`, with the numbers that `names` says.
     ///
     /// # Errors
     /// Those of [`Triangles::flatten`], where [`MAX_TRIANGLES`] is for stored triangles and instances together.
-    pub fn of(assembly: &Assembly) -> Result<Self, String> {
+    pub fn of(assembly: &Assembly, names: Option<&Names>) -> Result<Self, String> {
         refuse_shapes(assembly)?;
         let mut placements = vec![0u64; assembly.objects.len()];
         assembly.placements.iter().for_each(|p| placements[p.object as usize] += 1);
@@ -142,6 +143,10 @@ impl PlacedTriangles {
             if finite && !all.objects[number as usize].indices.is_empty() {
                 all.instances.push(PlacedObject { object: number, inst: inst as u32, to_world });
             }
+        }
+        if let Some(names) = names {
+            all.world.ids.iter_mut().for_each(|id| *id = names.of(id[0], id[1]));
+            all.instances.iter_mut().for_each(|placed| placed.inst = names.of(0, placed.inst)[1]);
         }
         if all.world.indices.is_empty() && all.instances.is_empty() { Err(NONE.into()) } else { Ok(all) }
     }
@@ -224,7 +229,7 @@ mod tests {
     fn what_is_placed_twice_is_kept_once() {
         let mut scene = scene();
         scene.groups[0].items.push(item(ItemKind::Mesh(0), DAffine3::from_translation(DVec3::Z)));
-        let all = PlacedTriangles::of(&Assembly::new(&scene).unwrap()).unwrap();
+        let all = PlacedTriangles::of(&Assembly::new(&scene).unwrap(), None).unwrap();
         assert_eq!((&all.world.ids[..], all.objects.len()), (&[[1, 0]][..], 1), "the root's own is placed once");
         assert_eq!(all.world.corners(0)[1], [1.0, 0.0, 1.0, 0.0]);
         assert_eq!((all.objects[0].ids.len(), all.objects[0].corners(0)[0]), (1, [1.0, 0.0, 0.0, 0.0]));

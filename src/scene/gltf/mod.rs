@@ -61,6 +61,7 @@ pub fn parse(file: &Path, name: &str, bytes: &[u8], references: &References<'_>)
     let parts = container::split(file, bytes)?;
     let root = json::read(file, &parts)?;
     let mut description = Description::new(name);
+    description.joins = true;
     description.warnings = extensions::check(file, &root)?;
     let document = Document {
         file,

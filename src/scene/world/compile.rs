@@ -1,11 +1,12 @@
 //! Compiling: one tree per object, the upper tree over instances.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::facets::Facets;
 use super::rounding::Rounding;
 use super::runs::Runs;
-use super::{Kinds, Object, Totals, World, instances, primitives, successor};
+use super::{Kinds, Object, Totals, World, instances, joined, primitives, successor};
 use crate::bvh::BuildSettings;
 use crate::error::Result;
 use crate::lanes::Real;
@@ -59,11 +60,16 @@ impl<S: Compiles> World<S> {
 impl<S: Real> World<S> {
     fn new(description: &Description, settings: BuildSettings, before: Option<&Self>) -> Result<Self> {
         let start = Instant::now();
-        let assembly = Assembly::new(description)?;
-        let mut counts = Vec::with_capacity(assembly.objects.len());
-        let mut objects = Vec::with_capacity(assembly.objects.len());
-        for object in &assembly.objects {
-            let known = before.and_then(|world| Some((world, successor::find(object, &world.assembly.objects)?)));
+        let assembly = Arc::new(Assembly::new(description)?);
+        let joined = description.joins.then(|| joined::join(&assembly, S::EPSILON.to_f64())).flatten();
+        let (traced, names) = match joined {
+            Some((traced, names)) => (Arc::new(traced), Some(names)),
+            None => (assembly.clone(), None),
+        };
+        let mut counts = Vec::with_capacity(traced.objects.len());
+        let mut objects = Vec::with_capacity(traced.objects.len());
+        for object in &traced.objects {
+            let known = before.and_then(|world| Some((world, successor::find(object, &world.traced.objects)?)));
             let (built, count) = match known {
                 Some((world, same)) => (world.objects[same].clone(), world.counts[same]),
                 None => primitives::build(object, settings),
@@ -71,11 +77,11 @@ impl<S: Real> World<S> {
             objects.push(built);
             counts.push(count);
         }
-        let instances = instances::all(&assembly.placements, &objects);
+        let instances = instances::all(&traced.placements, &objects);
         let (top, top_leaves, unbounded_instances) = instances::upper_tree(&instances, settings.preset);
         let runs: Vec<Runs> = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
         let facets = assembly.objects.iter().zip(&runs).map(|(o, runs)| Facets::new(o, runs)).collect();
-        let rounding = Rounding::of(&assembly.placements, &objects);
+        let rounding = Rounding::of(&traced.placements, &objects);
         let kinds = objects.iter().map(Object::kinds).fold(Kinds::default(), |a, b| Kinds {
             triangles: a.triangles || b.triangles,
             shapes: a.shapes || b.shapes,
@@ -87,6 +93,8 @@ impl<S: Real> World<S> {
         let build_seconds = start.elapsed().as_secs_f64();
         Ok(Self {
             assembly,
+            traced,
+            names,
             objects,
             instances,
             top,

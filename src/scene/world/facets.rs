@@ -172,7 +172,7 @@ impl<S: Real> World<S> {
             let lead = left.trailing_zeros() as usize % MAX_LANES;
             let same = positions_in::<S::Wide>(prims, prims[lead]) & positions_in::<S::Wide>(insts, insts[lead]) & left;
             left &= !same;
-            let run = self.runs[self.instances[insts[lead] as usize].object as usize].of(prims[lead]);
+            let run = self.runs[self.assembly.placements[insts[lead] as usize].object as usize].of(prims[lead]);
             parts = merge(<f32x16 as Lanes>::Mask::from_bits(same), run.part, parts);
         }
         (hit, parts)
@@ -265,10 +265,10 @@ impl<S: Real> World<S> {
     /// The same of a leaf of solids that stays where its object is and has a kernel for it.
     #[inline(always)]
     fn curved(&self, prim: u32, inst: u32, face: u32, position: Lanes3<S::Wide>) -> Option<Lanes3<S::Wide>> {
-        let instance = &self.instances[inst as usize];
-        let (run, place) = self.runs[instance.object as usize].placed(prim);
-        let part = &self.assembly.objects[instance.object as usize].parts[run.part as usize];
-        let (PartKind::Solids(tree), Some(place), true) = (&part.kind, place, instance.identity) else { return None };
+        let placement = &self.assembly.placements[inst as usize];
+        let (run, place) = self.runs[placement.object as usize].placed(prim);
+        let part = &self.assembly.objects[placement.object as usize].parts[run.part as usize];
+        let (PartKind::Solids(tree), Some(place), true) = (&part.kind, place, placement.stands()) else { return None };
         let solid = &tree.leaves[(prim - part.first_prim) as usize].solid;
         Some(place.normal_lanes(solids::curved_normal(solid, place.local_lanes(position), face)?))
     }
@@ -277,10 +277,10 @@ impl<S: Real> World<S> {
     #[inline(always)]
     fn facet(&self, hits: &Hits<S>, i: usize) -> (Run, Option<&Facet<S>>) {
         let (prim, inst) = (hits.prim[i], hits.inst[i]);
-        let instance = &self.instances[inst as usize];
-        let (at, run) = self.runs[instance.object as usize].find(prim);
-        let kept = self.facets[instance.object as usize].get(at, hits.u[i].to_f64() as usize);
-        (run, kept.filter(|_| instance.identity))
+        let placement = &self.assembly.placements[inst as usize];
+        let (at, run) = self.runs[placement.object as usize].find(prim);
+        let kept = self.facets[placement.object as usize].get(at, hits.u[i].to_f64() as usize);
+        (run, kept.filter(|_| placement.stands()))
     }
 
     /// Outward normal of hit `i`.

@@ -6,6 +6,8 @@
 mod compile;
 mod facets;
 mod instances;
+mod joined;
+mod names;
 mod primitives;
 mod rounding;
 mod runs;
@@ -16,12 +18,14 @@ mod totals;
 mod uv;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::DVec3;
 
 pub use crate::bvh::{BuildSettings, Preset};
 pub use compile::Compiles;
 pub use facets::Met;
+pub use names::Names;
 pub use rounding::Rounding;
 pub use runs::Place;
 pub use surface::Surface;
@@ -187,11 +191,15 @@ pub struct Instance<S> {
 /// Compiled scene in precision `S`.
 #[derive(Debug)]
 pub struct World<S> {
-    /// What prim and inst numbers mean.
-    pub assembly: Assembly,
-    /// Distinct objects, parallel to the assembly's.
+    /// What the prim and inst numbers of hits mean.
+    pub assembly: Arc<Assembly>,
+    /// What is traced: the assembly, or one that has some of its placements as one object.
+    pub traced: Arc<Assembly>,
+    /// What engines call hits before they hand them out, where that is not what the assembly calls them.
+    pub names: Option<Names>,
+    /// Distinct objects, parallel to those traced.
     pub objects: Vec<Object<S>>,
-    /// Instances, parallel to the assembly's placements.
+    /// Instances, parallel to the placements traced.
     pub instances: Vec<Instance<S>>,
     /// Tree over bounded instances, one in a leaf ([`World::top_leaves`]).
     pub top: Tree<S>,
@@ -205,11 +213,11 @@ pub struct World<S> {
     pub kinds: Kinds,
     /// What objects come to.
     pub totals: Totals,
-    /// Per object: its runs.
+    /// Per object of the assembly: its runs.
     runs: Vec<Runs>,
-    /// Per object: normals of its shapes and solids.
+    /// The same: normals of its shapes and solids.
     facets: Vec<Facets<S>>,
-    /// By object.
+    /// By object traced.
     counts: Vec<Counts>,
     build_seconds: f64,
 }
@@ -229,6 +237,8 @@ pub struct WorldStats {
     pub objects: u64,
     /// Instances.
     pub instances: u64,
+    /// Those of them that are traced as one object.
+    pub joined: u64,
     /// Primitives stored.
     pub prims: u64,
     /// Primitives counted once per instance.
@@ -298,8 +308,9 @@ impl<S: Real> World<S> {
     /// Counts and sizes.
     pub fn stats(&self) -> WorldStats {
         let mut stats = WorldStats {
-            objects: self.objects.len() as u64,
-            instances: self.instances.len() as u64,
+            objects: self.assembly.objects.len() as u64,
+            instances: self.assembly.placements.len() as u64,
+            joined: self.names.as_ref().map_or(0, Names::joined) as u64,
             instanced_prims: self.assembly.instanced_prims(),
             dropped_nonfinite: self.counts.iter().map(|c| c.nonfinite).sum(),
             dropped_degenerate: self.counts.iter().map(|c| c.degenerate).sum(),

@@ -1,5 +1,7 @@
 //! Primitives of an object: their boxes, the tree over them, their numbers in blocks in the order of its leaves.
 
+use std::ops::Range;
+
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 
@@ -30,6 +32,17 @@ pub fn build<S: Real>(object: &AssemblyObject, settings: BuildSettings) -> (Obje
         primitives.add(part, settings.preset, &mut counts);
     }
     (primitives.build(settings), counts)
+}
+
+/// Triangles of a mesh below which threads take longer to begin than to do the work.
+const FEW: usize = 1024;
+
+/// Adds what `item` makes of `numbers`, on all threads if they are many.
+fn extend<T: Send>(list: &mut Vec<T>, numbers: Range<usize>, item: impl Fn(usize) -> T + Send + Sync) {
+    match numbers.len() < FEW {
+        true => list.extend(numbers.map(item)),
+        false => list.par_extend(numbers.into_par_iter().map(item)),
+    }
 }
 
 /// Primitives of one object with bounds, and those without.
@@ -102,14 +115,15 @@ impl<S: Real> Primitives<S> {
         let is_identity = part.to_object == DAffine3::IDENTITY;
         let place = |p: DVec3| if is_identity { p } else { part.to_object.transform_point3(p) };
         let (first, of_mesh) = (self.triangles.len(), 0..mesh.triangles.len());
-        self.triangles.par_extend(of_mesh.into_par_iter().map(|i| Triangle::rounded(mesh.corners(i).map(place))));
+        extend(&mut self.triangles, of_mesh, |i| Triangle::rounded(mesh.corners(i).map(place)));
         let Self { sources, boxes, classes, triangles, .. } = self;
         let new = &triangles[first..];
         let source = |i: usize| Source { at: (first + i) as u32, id: part.first_prim + i as u32 };
         // As a rule all are good, and each has its place in the lists beforehand.
-        if new.par_iter().all(|corners| Triangle::check(corners).is_ok()) {
-            sources.par_extend((0..new.len()).into_par_iter().map(source));
-            boxes.par_extend(new.par_iter().map(Triangle::bounds));
+        let is_good = |corners| Triangle::check(corners).is_ok();
+        if if new.len() < FEW { new.iter().all(is_good) } else { new.par_iter().all(is_good) } {
+            extend(sources, 0..new.len(), source);
+            extend(boxes, 0..new.len(), |i| Triangle::bounds(&new[i]));
         } else {
             for (i, corners) in new.iter().enumerate() {
                 match Triangle::check(corners) {

@@ -67,7 +67,7 @@ impl<S: Real> World<S> {
         let (run, kept) = self.runs[placement.object as usize].placed(prim);
         let part = &self.assembly.objects[placement.object as usize].parts[run.part as usize];
         let material = run.material;
-        let stands = self.instances[inst as usize].identity;
+        let stands = placement.stands();
         let is_plain = stands && part.to_object == DAffine3::IDENTITY;
         // In an instance that stays where its object is, places in the object are places in the world.
         let kept = kept.filter(|_| stands);
@@ -118,8 +118,8 @@ impl<S: Real> World<S> {
     /// Unit outward normal of the shape or leaf `prim` of instance `inst`, which stays where its object is, at `position` on
     /// its face `face`; `None` of other instances and of triangles.
     pub(super) fn outward(&self, position: DVec3, face: u32, prim: u32, inst: u32) -> Option<DVec3> {
-        let object =
-            self.instances[inst as usize].identity.then_some(self.assembly.placements[inst as usize].object)?;
+        let placement = &self.assembly.placements[inst as usize];
+        let object = placement.stands().then_some(placement.object)?;
         let (run, kept) = self.runs[object as usize].placed(prim);
         let (part, place) = (&self.assembly.objects[object as usize].parts[run.part as usize], kept?);
         let local = place.local(position);
@@ -174,7 +174,7 @@ impl<S: Real> World<S> {
         }
         let [a, b, c] = mesh.corners((prim - part.first_prim) as usize);
         let (e1, e2) = (b - a, c - a);
-        if self.instances[inst as usize].identity && part.to_object == DAffine3::IDENTITY {
+        if placement.stands() && part.to_object == DAffine3::IDENTITY {
             return Some([a, e1, e2]);
         }
         let m = placement.to_world * part.to_object;

@@ -3,6 +3,7 @@
 use super::chunk::{RAYS, Set};
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::{Candidate, HitPacket, Hits, INVALID_ID};
+use crate::scene::world::Names;
 use crate::shape::BLOCK;
 
 /// The best hits of a chunk so far.
@@ -107,9 +108,17 @@ impl<S: Real> Best<S> {
         (self.prim[to], self.inst[to]) = (from.prim[i], from.inst[i]);
     }
 
-    /// Writes the hits to their places in a batch.
+    /// Writes the hits, by their names, to their places in a batch.
     #[inline(always)]
-    pub fn scatter(&self, hits: &mut Hits<S>, places: &[u32], id: impl Fn(u32) -> usize) {
+    pub fn scatter(
+        &mut self,
+        (hits, names): (&mut Hits<S>, Option<&Names>),
+        places: &[u32],
+        id: impl Fn(u32) -> usize,
+    ) {
+        if let Some(names) = names {
+            names.apply_each(&mut self.prim[..places.len()], &mut self.inst);
+        }
         let n = hits.t.len();
         let (t, u, v) = (&mut hits.t[..n], &mut hits.u[..n], &mut hits.v[..n]);
         let (prim, inst) = (&mut hits.prim[..n], &mut hits.inst[..n]);

@@ -207,7 +207,7 @@ impl<S: Real> Job<'_, S> {
     fn is_dead<V: Lanes<Scalar = S>>(&mut self, at: usize) -> bool {
         self.ask::<V>(at + AHEAD * V::N);
         let dead = !Packet::<V>::has_segment(self.rays, at);
-        if dead && let Output::Closest(hits) = &mut self.output {
+        if dead && let Output::Closest(hits, _) = &mut self.output {
             HitPacket::new(V::constant(f64::INFINITY)).store(hits, at);
         }
         dead
@@ -253,8 +253,8 @@ impl<S: Real> Job<'_, S> {
     #[inline(always)]
     fn sort<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>, t_max: V, live: u32) -> usize {
         match &mut self.output {
-            Output::Closest(hits) if live != V::ALL => HitPacket::<V>::new(t_max).store(hits, at),
-            Output::Closest(_) => {}
+            Output::Closest(hits, _) if live != V::ALL => HitPacket::<V>::new(t_max).store(hits, at),
+            Output::Closest(..) => {}
             Output::Any(out) => out.iter_mut().skip(at).take(V::N).for_each(|out| *out = 0),
         }
         let Memory { rows, starts, bins, .. } = &mut *self.memory;
@@ -329,7 +329,7 @@ impl<S: Real> Job<'_, S> {
                 let mut walk = walk::Walk::new(best, room, self.stack, self.counters, sieve);
                 walk.world::<V, ANY, COUNT>(self.world, chunk, inside, octant);
                 match &mut self.output {
-                    Output::Closest(hits) => best.scatter(hits, places, id),
+                    Output::Closest(hits, names) => best.scatter((hits, *names), places, id),
                     Output::Any(out) => best.scatter_done(out, places, id),
                 }
             }
@@ -359,7 +359,7 @@ where
         counters: Option<&mut Counters>,
     ) {
         hits.prepare(rays.len());
-        call::<V, false>(world, rays, Output::Closest(hits), scratch, counters);
+        call::<V, false>(world, rays, Output::Closest(hits, world.names.as_ref()), scratch, counters);
     }
 
     fn occluded(

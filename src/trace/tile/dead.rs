@@ -22,7 +22,7 @@ impl Job<'_> {
     /// Writes that no ray of a block meets anything.
     pub fn missed(&mut self, first: usize) {
         // Any-hit answers begin as misses.
-        let Output::Closest(hits) = &mut self.output else { return };
+        let Output::Closest(hits, _) = &mut self.output else { return };
         let [endless, zero, none] = [f32::INFINITY.to_bits(), 0.0f32.to_bits(), INVALID_ID].map(|x| [x; 16]);
         for at in (0..groups::<SETS>(self.rays, first)).map(|g| first + g * V::N) {
             for (x, column) in [(&endless, &mut hits.t), (&zero, &mut hits.u), (&zero, &mut hits.v)] {

@@ -33,7 +33,7 @@ impl Job<'_> {
         if groups.many || groups.is_behind {
             return false;
         }
-        let count = world.assembly.objects[world.instances[0].object as usize].prim_count as f32;
+        let count = world.traced.objects[world.instances[0].object as usize].prim_count as f32;
         let around = 4.0 * PI / groups.spacing::<N>();
         count > SPREAD * around.min(groups.rays_on::<N>(&world.first_object().tree.bounds)) && self.met::<N>()
     }
@@ -53,7 +53,9 @@ impl Job<'_> {
         let counters = &mut Counters::default();
         let mut query = Query::<f32, false, false>::new(HitPacket::new(f32::INFINITY), self.stack, counters);
         traverse::world(self.world, &ray, &mut query, 1);
-        let (prim, inst) = (query.hit.prim[0], query.hit.inst[0]);
+        let (mut hit, names) = (query.hit, &self.world.names);
+        names.iter().for_each(|names| names.apply(&mut hit.prim, &mut hit.inst));
+        let (prim, inst) = (hit.prim[0], hit.inst[0]);
         let triangle = if prim == INVALID_ID { None } else { self.world.triangle(prim, inst) };
         let Some([first, e1, e2]) = triangle else { return false };
         let from = first - DVec3::from(apex.map(f64::from));

@@ -31,7 +31,7 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
         counters: Option<&mut Counters>,
     ) {
         hits.prepare(rays.len());
-        call::<false, EXACT>(world, rays, Output::Closest(hits), scratch, counters, self.most);
+        call::<false, EXACT>(world, rays, Output::Closest(hits, world.names.as_ref()), scratch, counters, self.most);
     }
 
     fn intersect_pencil(
@@ -43,7 +43,7 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
         counters: Option<&mut Counters>,
     ) -> bool {
         hits.prepare(pencil.len());
-        let (none, output) = (&Rays::default(), Output::Closest(hits));
+        let (none, output) = (&Rays::default(), Output::Closest(hits, world.names.as_ref()));
         let (mut unread, count) = (Counters::default(), ALWAYS_COUNTS || counters.is_some());
         let counters = counters.unwrap_or(&mut unread);
         let mut job = Job::new(world, none, scratch, counters, output, self.most);

@@ -15,6 +15,7 @@ use crate::lanes::chosen::merge_lists;
 use crate::lanes::words::{greatest, positions};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each};
 use crate::ray::{HitPacket, Hits, INVALID_ID, Packet, Rays};
+use crate::scene::world::Names;
 use crate::trace::output::Output;
 use crate::trace::stream;
 
@@ -246,7 +247,7 @@ impl Job<'_> {
 
     /// A group's rays miss, until they are found to hit.
     fn miss(&mut self, first: usize) {
-        if let Output::Closest(hits) = &mut self.output {
+        if let Output::Closest(hits, _) = &mut self.output {
             HitPacket::<V>::new(V::constant(0.0)).store(hits, first);
         }
     }
@@ -284,12 +285,12 @@ impl Job<'_> {
             memory,
             stack,
             counters,
-            output: Output::Closest(&mut hits),
+            output: Output::Closest(&mut hits, self.world.names.as_ref()),
             apart: false,
             plain: !EXACT,
         };
         job.run::<V, false, COUNT>((0..ids.len()).step_by(V::N));
-        if let Output::Closest(to) = &mut self.output {
+        if let Output::Closest(to, _) = &mut self.output {
             for (i, &id) in ids.iter().enumerate() {
                 let id = id as usize;
                 (to.t[id], to.u[id], to.v[id]) = (hits.t[i], hits.u[i], hits.v[i]);
@@ -301,9 +302,13 @@ impl Job<'_> {
     }
 }
 
-/// Writes the hits of some lanes of a group; what is there of the others stays.
+/// Writes the hits of some lanes of a group, by their names; what is there of the others stays.
 #[inline(always)]
-pub fn put(hit: &HitPacket<V>, hits: &mut Hits<f32>, first: usize, lanes: u32) {
+pub fn put(hit: &HitPacket<V>, (hits, names): (&mut Hits<f32>, Option<&Names>), first: usize, lanes: u32) {
+    let mut hit = *hit;
+    if let Some(names) = names {
+        names.apply(&mut hit.prim, &mut hit.inst);
+    }
     let mask = Mask::from_bits(lanes);
     let found = Mask::from_bits(!positions(&hit.prim, INVALID_ID));
     let t = select(found, hit.t, V::splat(f32::INFINITY));

@@ -348,8 +348,8 @@ impl<'a> Job<'a> {
         let lanes = exact.bundle.tame[g];
         let is_part = exact.bundle.shared == Shared::Behind && lanes != V::ALL;
         if !EXACT && odd == 0 && !is_part {
-            if let Output::Closest(hits) = &mut self.output {
-                self.memory.groups.store_own(g, exact.bundle, hits, self.past);
+            if let Output::Closest(hits, names) = &mut self.output {
+                self.memory.groups.store_own(g, exact.bundle, (hits, *names), self.past);
             }
             return;
         }
@@ -364,11 +364,9 @@ impl<'a> Job<'a> {
         if odd != 0 {
             hit = self.rest::<ANY, COUNT>(first, odd, Some(hit)).0;
         }
-        if let Output::Closest(hits) = &mut self.output {
-            match is_part {
-                true => mirror::put(&hit, hits, first, lanes),
-                false => hit.store(hits, first),
-            }
+        match &mut self.output {
+            Output::Closest(hits, names) if is_part => mirror::put(&hit, (hits, *names), first, lanes),
+            output => output.put(first, &hit, 0),
         }
     }
 

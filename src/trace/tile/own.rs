@@ -15,6 +15,7 @@ use crate::lanes::chosen::merge;
 use crate::lanes::words::{below, positions};
 use crate::lanes::{LaneMask, Lanes, f64x8, map3};
 use crate::ray::{HitPacket, Hits, INVALID_ID};
+use crate::scene::world::Names;
 use crate::shape::{Block, Triangle};
 
 /// The numbers of a triangle: ties of depth go to the smaller instance, then to the smaller primitive.
@@ -235,21 +236,31 @@ impl Groups {
         (found, t, u, v)
     }
 
-    /// Writes a group's own hits and misses. `past`: past the caches.
+    /// Writes a group's own hits and misses, by their names. `past`: past the caches.
     #[inline(always)]
-    pub fn store_own(&self, g: usize, bundle: &Bundle, hits: &mut Hits<f32>, past: bool) {
+    pub fn store_own(&self, g: usize, bundle: &Bundle, to: (&mut Hits<f32>, Option<&Names>), past: bool) {
+        let (hits, names) = to;
         let (found, t, u, v) = self.own_numbers(g, bundle);
         let first = bundle.first + g * V::N;
         let store = |x: &[u32; 16], to: &mut [u32]| store(x, to, first, past);
         let t = select(found, t, V::splat(f32::INFINITY));
+        let none = V::splat(f32::from_bits(INVALID_ID));
         for (x, to) in [(t, &mut hits.t), (u, &mut hits.u), (v, &mut hits.v)] {
             store(&bytemuck::cast(x.to_array()), bytemuck::cast_slice_mut(to));
+        }
+        if let Some(names) = names {
+            let (mut prim, mut inst) = (self.of[g].slot, if self.many { self.inst[g] } else { [0; 16] });
+            names.apply(&mut prim, &mut inst);
+            store(&prim, &mut hits.prim);
+            return store(
+                &bytemuck::cast(select(found, V::new(bytemuck::cast(inst)), none).to_array()),
+                &mut hits.inst,
+            );
         }
         store(&self.of[g].slot, &mut hits.prim);
         if self.many {
             return store(&self.inst[g], &mut hits.inst);
         }
-        let none = V::splat(f32::from_bits(INVALID_ID));
         store(&bytemuck::cast(select(found, V::constant(0.0), none).to_array()), &mut hits.inst);
     }
 

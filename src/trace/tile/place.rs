@@ -38,7 +38,7 @@ impl<'a> Place<'a> {
     pub fn new(world: &'a World<f32>, inst: u32, frame: &Frame) -> Self {
         let instance = &world.instances[inst as usize];
         let object = &world.objects[instance.object as usize];
-        let map = &world.assembly.placements[inst as usize].to_world;
+        let map = &world.traced.placements[inst as usize].to_world;
         let mut to_world = Affine::from_f64(map);
         to_world.rows.iter_mut().flatten().for_each(|x| *x *= frame.scale);
         Self { inst, object, frame: frame.through(map, &object.tree.bounds), to_world, instance }

@@ -238,7 +238,7 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
         }
         let inst = self.0.top_leaves[child.index as usize] as usize;
         prefetch(&self.0.instances, inst);
-        prefetch(&self.0.assembly.placements, inst);
+        prefetch(&self.0.traced.placements, inst);
     }
 
     #[inline(always)]

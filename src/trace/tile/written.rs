@@ -21,7 +21,7 @@ pub struct Written {
 impl Written {
     /// Whether the answers of `count` rays are to be written past the caches. Decides about time only.
     pub fn past(&mut self, count: usize, output: &Output<f32>) -> bool {
-        let Output::Closest(hits) = output else { return false };
+        let Output::Closest(hits, _) = output else { return false };
         let place = hits.t.as_ptr().addr();
         let known = self.places.contains(&place);
         if !known {
@@ -41,7 +41,7 @@ mod tests {
     fn answers_that_pile_up_are_written_past_the_caches() {
         let mut all: Vec<Hits<f32>> = (0..LATELY + 1).map(|_| Hits::new(16)).collect();
         let mut written = Written::default();
-        let mut past = |hits: &mut Hits<f32>, count| written.past(count, &Output::Closest(hits));
+        let mut past = |hits: &mut Hits<f32>, count| written.past(count, &Output::Closest(hits, None));
         for _ in 0..3 {
             assert!(all.iter_mut().all(|hits| past(hits, BLOCK)));
         }
