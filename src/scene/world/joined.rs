@@ -77,9 +77,9 @@ fn smallest_height([a, b, c]: [DVec3; 3]) -> f64 {
 pub fn join(assembly: &Assembly, epsilon: f64) -> Option<(Assembly, Names)> {
     let chosen = choose(assembly, epsilon);
     let is_joined = |placement: &Placement| chosen[placement.object as usize];
-    let mut joined = assembly.placements.iter().filter(|p| is_joined(p));
-    let first = joined.next()?;
-    if first.stands() && joined.next().is_none() {
+    let count = assembly.placements.iter().filter(|p| is_joined(p)).count();
+    // One among others is an instance as good as any.
+    if count == 0 || count == 1 && (assembly.placements.len() > 1 || assembly.placements[0].stands()) {
         return None;
     }
     let mut traced = Assembly::default();
@@ -198,6 +198,7 @@ mod tests {
         assert!(join(&Assembly::default(), SINGLE).is_none());
         assert!(join(&assembly(&[7], &[(0, DAffine3::IDENTITY)]), SINGLE).is_none());
         assert!(join(&assembly(&[7], &[(0, at(1.0))]), SINGLE).is_some());
+        assert!(join(&assembly(&[70, 9], &[(0, at(1.0)), (1, at(2.0)), (1, at(3.0))]), SINGLE).is_none());
         assert!(join(&assembly(&[100], &[(0, at(1.0)), (0, at(2.0))]), SINGLE).is_none(), "twice as much");
     }
 

@@ -121,7 +121,8 @@ impl<S: Real> Primitives<S> {
         let source = |i: usize| Source { at: (first + i) as u32, id: part.first_prim + i as u32 };
         // As a rule all are good, and each has its place in the lists beforehand.
         let is_good = |corners| Triangle::check(corners).is_ok();
-        if if new.len() < FEW { new.iter().all(is_good) } else { new.par_iter().all(is_good) } {
+        let are_good = if new.len() < FEW { new.iter().all(is_good) } else { new.par_iter().all(is_good) };
+        if are_good {
             extend(sources, 0..new.len(), source);
             extend(boxes, 0..new.len(), |i| Triangle::bounds(&new[i]));
         } else {
