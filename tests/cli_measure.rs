@@ -169,6 +169,28 @@ fn info_counts_and_measures() {
     assert!(text.contains("primitives") && text.contains("SAH cost"), "{text}");
 }
 
+/// Two nodes with one mesh, a triangle, one of them turned on its side.
+const TWO_NODES: &str = r#"{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "nodes": [{"mesh": 0, "translation": [5, 0, 0]}, {"mesh": 0, "rotation": [0.6, 0, 0, 0.8]}],
+    "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+    "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri":
+    "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+
+#[test]
+fn what_is_joined_is_said_and_can_be_left_apart() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("two.gltf"), TWO_NODES).expect("a scene");
+    let counts = |line: &str| {
+        let counts = &run(&dir, line).json()["counts"];
+        ["objects", "instances", "joined", "primitives"].map(|key| counts[key].as_u64().expect("a number"))
+    };
+    assert_eq!(counts("info two.gltf --json"), [1, 2, 2, 2]);
+    assert_eq!(counts("info two.gltf --json --apart"), [1, 2, 0, 1]);
+    assert!(run(&dir, "info two.gltf").out.contains("placed 2 times, 2 traced as one mesh"));
+    assert!(run(&dir, "info two.gltf --apart").out.contains("placed 2 times\n"));
+    assert_eq!(run(&dir, "verify two.gltf --rays 300 --json").json()["pass"], true);
+}
+
 /// Ctrl-C in the middle of a bench: exit code 130, and the output is whole.
 #[cfg(unix)]
 #[test]

@@ -77,6 +77,9 @@ pub struct SceneOptions {
     /// Show a BRL-CAD database without what is not supported, instead of refusing it
     #[arg(long, help_heading = "Scene")]
     pub lenient: bool,
+    /// Trace each mesh that a glTF file places as an instance, to see what joining them is worth
+    #[arg(long, help_heading = "Scene")]
+    pub apart: bool,
     /// Time the build may take: how good the tree gets
     #[arg(long, value_enum, default_value_t = PresetArg::Balanced, help_heading = "Scene")]
     pub preset: PresetArg,
@@ -133,7 +136,10 @@ impl SceneOptions {
     /// Those of [`load_with`].
     pub fn load_with(&self, scene: &str, read: &ReadMesh<'_>) -> Result<Description> {
         let brlcad = Options { tops: self.top.clone(), lenient: self.lenient };
-        load_with(scene, &LoadOptions { set: self.set.clone(), allow_outside: self.allow_outside, brlcad }, read)
+        let options = LoadOptions { set: self.set.clone(), allow_outside: self.allow_outside, brlcad };
+        let mut description = load_with(scene, &options, read)?;
+        description.joins &= !self.apart;
+        Ok(description)
     }
 
     /// The precision asked for here, else by the scene, else f32.
