@@ -77,9 +77,9 @@ fn compare<S: Shades>(integrator: Integrator, most: f32) -> [usize; 3] {
 #[test]
 fn joined_meshes_look_as_they_do_apart() {
     let [ids, colours, hits] = compare::<f64>(Integrator::Whitted, 1e-5);
-    assert!(ids == 0 && colours == 0 && hits > 800, "f64: {ids} ids, {colours} colours of {hits}");
+    assert!(ids == 0 && colours == 0 && hits > 500, "f64: {ids} ids, {colours} colours of {hits}");
     let [ids, colours, hits] = compare::<f32>(Integrator::Whitted, 1e-3);
-    assert!(ids <= 4 && colours <= 12 && hits > 800, "f32: {ids} ids, {colours} colours of {hits}");
+    assert!(ids <= 4 && colours <= 12 && hits > 500, "f32: {ids} ids, {colours} colours of {hits}");
     let [ids, colours, hits] = compare::<f64>(Integrator::Path, 1e-4);
-    assert!(ids == 0 && colours <= 4 && hits > 800, "f64 path: {ids} ids, {colours} colours of {hits}");
+    assert!(ids == 0 && colours <= 4 && hits > 500, "f64 path: {ids} ids, {colours} colours of {hits}");
 }

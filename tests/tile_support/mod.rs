@@ -94,7 +94,7 @@ fn admitted_like(known: &Answers<f32>, scene: &Scene, rays: &Rays<f32>, scalar: 
 }
 
 /// One hit, to the last bit.
-fn bits(hits: &Hits<f32>, i: usize) -> ([u32; 3], u32, u32) {
+pub fn bits(hits: &Hits<f32>, i: usize) -> ([u32; 3], u32, u32) {
     ([hits.t[i], hits.u[i], hits.v[i]].map(f32::to_bits), hits.prim[i], hits.inst[i])
 }
 
