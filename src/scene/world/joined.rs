@@ -12,6 +12,9 @@ use super::names::{self, Names};
 use crate::scene::assembly::{Assembly, AssemblyObject, Part, PartKind, Placement};
 use crate::shape::BLOCK;
 
+/// Most triangles of copies of what is placed more than once: no file is to ask for more memory by that than its size explains.
+const MOST_COPIED: u64 = 1 << 22;
+
 /// Rounding to world space may move corners by this part of what is between them.
 const TOLERANCE: f64 = 1.0 / 256.0;
 
@@ -75,7 +78,7 @@ fn smallest_height([a, b, c]: [DVec3; 3]) -> f64 {
 /// What is traced in place of `assembly` in a precision of relative rounding `epsilon`, and the names of what is hit; `None` if that
 /// is the assembly as it is.
 pub fn join(assembly: &Assembly, epsilon: f64) -> Option<(Assembly, Names)> {
-    let chosen = choose(assembly, epsilon);
+    let chosen = choose(assembly, epsilon, MOST_COPIED);
     let is_joined = |placement: &Placement| chosen[placement.object as usize];
     let count = assembly.placements.iter().filter(|p| is_joined(p)).count();
     // One among others is an instance as good as any.
@@ -125,8 +128,8 @@ impl AssemblyObject {
     }
 }
 
-/// By object: whether it is joined, wherever it is placed.
-fn choose(assembly: &Assembly, epsilon: f64) -> Vec<bool> {
+/// By object: whether it is joined, wherever it is placed. `room`: most triangles of copies.
+fn choose(assembly: &Assembly, epsilon: f64, mut room: u64) -> Vec<bool> {
     let extents: Vec<_> = assembly.objects.par_iter().map(Extent::of).collect();
     let mut placed = vec![0u64; extents.len()];
     let mut bears = vec![true; extents.len()];
@@ -139,8 +142,10 @@ fn choose(assembly: &Assembly, epsilon: f64) -> Vec<bool> {
     let mut chosen = vec![false; extents.len()];
     for (i, object) in assembly.objects.iter().enumerate() {
         let (times, count) = (placed[i], u64::from(object.prim_count));
-        if bears[i] && (times == 1 || times > 1 && count <= BLOCK as u64) && times * count < numbers {
-            numbers -= times * count;
+        let (all, copied) = (times * count, if times > 1 { times * count } else { 0 });
+        let is_small = times == 1 || times > 1 && count <= BLOCK as u64;
+        if bears[i] && is_small && all < numbers && copied <= room {
+            (numbers, room) = (numbers - all, room - copied);
             chosen[i] = true;
         }
     }
@@ -207,7 +212,9 @@ mod tests {
         let places = |object: u32, count: usize| (0..count).map(move |i| (object, at(i as f64)));
         let all: Vec<_> = places(0, 10).chain(places(1, 2)).chain(places(2, 2)).chain(places(3, 1)).collect();
         // The last one is never placed.
-        assert_eq!(choose(&assembly(&[1, 8, 9, 1100, 8], &all), SINGLE), [true, true, false, true, false]);
+        let some = assembly(&[1, 8, 9, 1100, 8], &all);
+        assert_eq!(choose(&some, SINGLE, 26), [true, true, false, true, false]);
+        assert_eq!(choose(&some, SINGLE, 25), [true, false, false, true, false], "10 and 16 are more than 25");
     }
 
     /// What would lose its form in world space stays an instance; in f64 there is room.
@@ -216,24 +223,24 @@ mod tests {
         let placed = |map: DAffine3| assembly(&[100, 100], &[(0, map), (1, at(0.5))]);
         let (far, scaled) = (|x: f64| placed(at(x)), |s: f64| placed(DAffine3::from_scale(DVec3::splat(s))));
         // Heights of about 1/50.
-        assert_eq!(choose(&far(1e3), SINGLE), [true, true]);
-        assert_eq!(choose(&far(2e3), SINGLE), [false, true]);
-        assert_eq!(choose(&far(2e3), SINGLE * SINGLE), [true, true]);
+        assert_eq!(choose(&far(1e3), SINGLE, 99), [true, true]);
+        assert_eq!(choose(&far(2e3), SINGLE, 99), [false, true]);
+        assert_eq!(choose(&far(2e3), SINGLE * SINGLE, 99), [true, true]);
         // Size alone costs no digits, but numbers are to be such that products of them are.
         for (scale, joined) in [(1e-9, true), (1e-12, false), (1e9, true), (1e15, false)] {
-            assert_eq!(choose(&scaled(scale), SINGLE), [joined, true], "{scale}");
+            assert_eq!(choose(&scaled(scale), SINGLE, 99), [joined, true], "{scale}");
         }
         // As far off before its map: nothing is lost by that.
         let mut shifted = far(0.0);
         shifted.objects[0].parts[0].to_object = at(1e6);
-        assert_eq!(choose(&shifted, SINGLE), [true, true]);
+        assert_eq!(choose(&shifted, SINGLE, 99), [true, true]);
         // A mesh with some corners that are not finite is joined, one without any other is not.
         let mut broken = far(1.0);
         let PartKind::Mesh(mesh) = &mut broken.objects[0].parts[0].kind else { panic!("a mesh") };
         Arc::make_mut(mesh).positions[0].x = f64::NAN;
-        assert_eq!(choose(&broken, SINGLE), [true, true]);
+        assert_eq!(choose(&broken, SINGLE, 99), [true, true]);
         let PartKind::Mesh(mesh) = &mut broken.objects[0].parts[0].kind else { panic!("a mesh") };
         Arc::make_mut(mesh).positions.fill(DVec3::INFINITY);
-        assert_eq!(choose(&broken, SINGLE), [false, true]);
+        assert_eq!(choose(&broken, SINGLE, 99), [false, true]);
     }
 }
