@@ -3,7 +3,8 @@
 //! Formats like glTF place every mesh by a node. To engines an instance is work: the ray, or the tile, goes through its map, and
 //! the instance's tree begins anew where that of its neighbours knows nothing of it. So what is placed once goes into one tree, in
 //! world space, where the map costs its corners no digits that tell; and so do meshes no larger than a leaf, however often they are
-//! placed: each would be a tree without a node. Hits keep the assembly's numbers: [`Names`].
+//! placed: each would be a tree without a node. Hits keep the assembly's numbers: [`Names`]. Of equal hits the one with the smaller
+//! number wins, as everywhere; but against what stays an instance all that is joined counts as the first of it.
 
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
