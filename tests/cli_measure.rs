@@ -48,6 +48,22 @@ fn verify_covers_every_engine_query_class_and_precision() {
     assert_eq!(full.lines().count(), brief.lines().count() + lines.len(), "and one per engine: {full}");
 }
 
+/// Shapes that are thinner than rounding reaches: whoever judges must find them where they are, not where their own space has them.
+#[test]
+fn verify_explains_what_rounding_does_to_stretched_shapes() {
+    let dir = tempfile::tempdir().expect("a folder");
+    for (shape, scale) in
+        [("disc", "1e3 0.01 1"), ("disc", "1e4 1 1"), ("sphere", "1e3 0.01 0.01"), ("cone", "1e3 0.01 0.01")]
+    {
+        let scene = format!("{shape} {{ scale {scale} }}\nsphere {{ translate 3 0 0 }}\n");
+        std::fs::write(dir.path().join("thin.kdl"), scene).expect("a file");
+        for seed in 1..=3 {
+            let report = run(&dir, &format!("verify thin.kdl --rays 500 --seed {seed} --json")).json();
+            assert_eq!(report["pass"], true, "{shape} {scale}, seed {seed}");
+        }
+    }
+}
+
 #[test]
 fn bench_prints_a_table_and_writes_rows_facts_and_a_picture() {
     let dir = square();

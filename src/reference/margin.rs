@@ -1,7 +1,8 @@
 //! How far an engine's rounding reaches, and which surfaces lie within that reach of a ray.
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
+use super::nearest::{Outline, to_face};
 use super::object::{Prim, Solid};
 use super::shapes::{self, Crossing, Crossings};
 use super::tree::Bounds;
@@ -119,25 +120,35 @@ impl Located<'_> {
         ng.dot(ray.dir).abs() / (ng.length() * ray.dir.length())
     }
 
-    /// The ray and its displaced copies: circles of `delta` and half of it, and straight at a shape's centre.
+    /// The ray and its displaced copies: circles of `delta` and half of it, and straight at a triangle's centre; of a shape, which may
+    /// be thinner than the circles are apart, also its points nearest to all of these, as far as they are within `delta`.
     pub fn displaced(&self, ray: &OracleRay, delta: f64) -> impl Iterator<Item = OracleRay> {
         let forward = ray.dir.normalize();
         let (a, b) = forward.any_orthonormal_pair();
-        let circle = move |count: u32, radius: f64| {
-            (0..count).map(move |i| {
-                let (sin, cos) = (std::f64::consts::TAU * f64::from(i) / f64::from(count)).sin_cos();
-                radius * (cos * a + sin * b)
-            })
+        let circle = |count: u32, radius: f64| {
+            (0..count).map(move |i| radius * DVec2::from_angle(std::f64::consts::TAU * f64::from(i) / f64::from(count)))
         };
-        let aimed = match &self.geometry {
-            Geometry::Triangle([p0, p1, p2]) => (p0 + p1 + p2) / 3.0,
-            Geometry::Solid(_, to_local) => to_local.inverse().transform_point3(DVec3::Z * 0.5),
-        } - ray.org;
-        let aimed = (aimed - forward * aimed.dot(forward)).clamp_length_max(delta);
-        let offsets = [DVec3::ZERO, aimed].into_iter();
-        let offsets = offsets.chain(circle(DIRECTIONS, delta)).chain(circle(DIRECTIONS / 2, 0.5 * delta));
+        let circles = || circle(DIRECTIONS, delta).chain(circle(DIRECTIONS / 2, 0.5 * delta));
+        let across = |v: DVec3| DVec2::new(v.dot(a), v.dot(b));
+        let mut offsets = vec![DVec2::ZERO];
+        match &self.geometry {
+            Geometry::Triangle([p0, p1, p2]) => {
+                offsets.push(across((p0 + p1 + p2) / 3.0 - ray.org).clamp_length_max(delta));
+                offsets.extend(circles());
+            }
+            Geometry::Solid(solid, to_local) => {
+                let to_world = to_local.inverse();
+                let centre = to_world.transform_point3(DVec3::Z * 0.5) - ray.org;
+                offsets.push(across(centre).clamp_length_max(delta));
+                offsets.extend(circles());
+                if let Some(outline) = Outline::new(solid.shape, to_world, ray.org, [a, b]) {
+                    let nearest = std::iter::once(DVec2::ZERO).chain(circles()).map(|w| outline.nearest(w));
+                    offsets.extend(nearest.filter(|w| w.length() <= delta));
+                }
+            }
+        }
         let ray = *ray;
-        offsets.map(move |w| OracleRay { org: ray.org + w, ..ray })
+        offsets.into_iter().map(move |w| OracleRay { org: ray.org + w.x * a + w.y * b, ..ray })
     }
 
     /// Whether the point of the ray at `t` is within `delta` of the surface. With `order`, only the first (0) or
@@ -158,7 +169,7 @@ impl Located<'_> {
         }
         // Rays along a flat shape never cross it, however they are displaced.
         let flat = matches!(solid.shape, Shape::HalfSpace | Shape::Disc);
-        flat && to_face(solid.shape, 0, to_local, ray.at(t)) <= delta
+        flat && off_face(solid.shape, 0, to_local, ray.at(t)) <= delta
     }
 
     /// Range of t over which displaced rays cross a solid for the `order`-th time, give or take `delta`. The solids
@@ -194,7 +205,7 @@ impl Located<'_> {
         let seen = self.displaced(ray, delta).flat_map(|r| self.crossings(&r)).flatten();
         let ts = seen.filter(|c| c.face == face).map(|c| c.t);
         let (lo, hi) = ts.fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), t| (lo.min(t), hi.max(t)));
-        (lo - along <= t && t <= hi + along) || to_face(solid.shape, face, to_local, ray.at(t)) <= 2.0 * delta
+        (lo - along <= t && t <= hi + along) || off_face(solid.shape, face, to_local, ray.at(t)) <= 2.0 * delta
     }
 
     /// Whether the ray's segment comes within `delta` of the surface.
@@ -272,11 +283,9 @@ impl Placed {
     }
 }
 
-/// World distance from `p` to a point of a solid's face near it; infinite if there is no such face.
-fn to_face(shape: Shape, face: u32, to_local: &DAffine3, p: DVec3) -> f64 {
-    let local = to_local.transform_point3(p);
-    let nearest = shapes::nearest_on_face(shape, face, local);
-    nearest.map_or(f64::INFINITY, |q| to_local.inverse().transform_vector3(q - local).length())
+/// World distance from `p` to a solid's face: see [`to_face`].
+fn off_face(shape: Shape, face: u32, to_local: &DAffine3, p: DVec3) -> f64 {
+    to_face(shape, face, &to_local.matrix3.inverse(), to_local.transform_point3(p))
 }
 
 /// Whether the line passes a triangle within `delta` and meets its plane near `t`: beside a steep triangle the plane

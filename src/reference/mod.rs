@@ -41,6 +41,7 @@
 mod judge;
 mod magnitude;
 mod margin;
+mod nearest;
 mod object;
 mod shapes;
 mod solids;

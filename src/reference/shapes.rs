@@ -144,28 +144,6 @@ pub(super) fn normal(shape: Shape, face: u32, p: DVec3) -> DVec3 {
     if n == DVec3::ZERO { DVec3::Z } else { n }
 }
 
-/// A point of the face `face` of `shape` near `p`, canonical space: the nearest one but for the side of a cone, where
-/// it is the one at the height of `p`. `None` if there is no such face.
-pub(super) fn nearest_on_face(shape: Shape, face: u32, p: DVec3) -> Option<DVec3> {
-    let flat = |z: f64, radius: f64| DVec3::new(p.x, p.y, 0.0).clamp_length_max(radius).with_z(z);
-    let side = |radius: f64| (DVec3::new(p.x, p.y, 0.0).normalize_or(DVec3::X) * radius).with_z(p.z.clamp(0.0, 1.0));
-    Some(match (shape, face) {
-        (Shape::Sphere, 0) => p.normalize_or(DVec3::X),
-        (Shape::HalfSpace, 0) => flat(0.0, f64::INFINITY),
-        (Shape::Disc, 0) | (Shape::Cylinder | Shape::Cone { .. }, 1) => flat(0.0, 1.0),
-        (Shape::Cylinder, 0) => side(1.0),
-        (Shape::Cylinder, 2) => flat(1.0, 1.0),
-        (Shape::Cone { top }, 0) => side(1.0 - (1.0 - top) * p.z.clamp(0.0, 1.0)),
-        (Shape::Cone { top }, 2) => flat(1.0, top),
-        (Shape::Cuboid, 0..6) => {
-            let mut q = p.clamp(DVec3::NEG_ONE, DVec3::ONE);
-            q[face as usize / 2] = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
-            q
-        }
-        _ => return None,
-    })
-}
-
 /// Lower and upper corner of `shape` in its canonical space; infinite for the half-space.
 pub(super) fn canonical_bounds(shape: Shape) -> (DVec3, DVec3) {
     match shape {
@@ -178,6 +156,9 @@ pub(super) fn canonical_bounds(shape: Shape) -> (DVec3, DVec3) {
 
 #[cfg(test)]
 mod tests {
+    use glam::DMat3;
+
+    use super::super::nearest::to_face;
     use super::*;
 
     fn ts(shape: Shape, org: [f64; 3], dir: [f64; 3]) -> Vec<(f64, u32)> {
@@ -285,7 +266,7 @@ mod tests {
                 let (np, nq) = (normal(shape, a.face, p), normal(shape, b.face, q));
                 assert!(a.t <= b.t && np.dot(dir) <= 1e-7 && nq.dot(dir) >= -1e-7, "{shape:?} {org} {dir}");
                 for (p, face) in [(p, a.face), (q, b.face)] {
-                    assert!(nearest_on_face(shape, face, p).unwrap().distance(p) < 1e-7, "{shape:?} {face} {p}");
+                    assert!(to_face(shape, face, &DMat3::IDENTITY, p) < 1e-7, "{shape:?} {face} {p}");
                     let off = match (shape, face) {
                         (Shape::Sphere, _) => p.length() - 1.0,
                         (Shape::Cuboid, _) => p.abs().max_element() - 1.0,
