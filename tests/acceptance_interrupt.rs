@@ -1,4 +1,5 @@
-//! A render that is stopped by Ctrl-C: exit code 130, a valid picture of the finished tiles, no temporary file.
+//! A render that is stopped by Ctrl-C: exit code 130, a valid picture of the finished tiles, no temporary file. One that is killed goes
+//! on from its finished tiles.
 #![cfg(unix)]
 
 mod binary;
@@ -7,7 +8,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use binary::watch::Running;
-use binary::{Ended, files};
+use binary::{Ended, files, lanecast};
 use lanecast::film::{exr, png};
 
 const LIMIT: Duration = Duration::from_secs(50);
@@ -80,4 +81,33 @@ fn without_a_finished_tile_the_older_picture_is_kept() {
         assert_eq!(std::fs::read(&target).ok().as_deref(), older, "{err}");
         assert_eq!(files(dir.path()).len(), usize::from(older.is_some()));
     }
+}
+
+/// Killed without a chance to write anything: `--resume` goes on, and the picture has the bits of one that nobody disturbed.
+#[test]
+fn a_killed_render_goes_on() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let line = |target: &str, more: &str| {
+        let line = format!("render builtin:gallery -o {target} --size 320x320 --spp 8 --integrator ao --aov Z{more}");
+        line.split(' ').map(String::from).collect::<Vec<_>>()
+    };
+    let words = line("out.exr", " --resume");
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let (running, kept) = (Running::start(dir.path(), &words), dir.path().join("out.exr.tiles"));
+    let since = std::time::Instant::now();
+    let length = || std::fs::metadata(&kept).map_or(0, |meta| meta.len());
+    while length() < 100_000 {
+        assert!(since.elapsed() < LIMIT, "tiles are kept");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-KILL", &running.id().to_string()]).status().expect("kill").success());
+    running.wait(LIMIT);
+    assert_eq!(files(dir.path()), ["out.exr.tiles"], "killed before it was done");
+    let ended = lanecast(dir.path(), &words);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+    assert_eq!(files(dir.path()), ["out.exr"], "the tiles are not needed any more");
+    let words = line("whole.exr", "");
+    assert_eq!(lanecast(dir.path(), &words.iter().map(String::as_str).collect::<Vec<_>>()).code, Some(0));
+    let [out, whole] = ["out.exr", "whole.exr"].map(|name| exr::read(&dir.path().join(name)).expect("a file"));
+    assert_eq!(out.planes, whole.planes);
 }

@@ -6,7 +6,7 @@ use super::output::OutputArgs;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::render::progressive::{LARGEST_BLOCK, Progressive};
-use crate::render::{Progress, RenderOptions, RenderOutput, render_with};
+use crate::render::{Keeper, Progress, RenderOptions, RenderOutput, render_kept};
 use crate::scene::description::Description;
 use crate::scene::world::World;
 use crate::shade::Shades;
@@ -60,6 +60,8 @@ pub(super) struct Job<'a, S: Shades> {
     pub description: &'a Description,
     pub camera: &'a Camera,
     pub options: &'a RenderOptions,
+    /// Where finished tiles are kept, if they are. Not for pictures that are shown by blocks.
+    pub keeper: Option<&'a Keeper>,
     /// Brightness of previews in stops.
     pub exposure: f32,
     /// What a viewer calls the picture.
@@ -76,7 +78,7 @@ impl<S: Shades> Job<'_, S> {
     pub fn render(&self, how: &PreviewArgs, progress: &dyn Progress) -> Result<(RenderOutput, Option<Live>)> {
         let Self { engine, world, description, camera, options, .. } = *self;
         if !how.by_blocks() {
-            return Ok((render_with(engine, world, description, camera, options, progress)?, None));
+            return Ok((render_kept(engine, world, description, camera, options, progress, self.keeper)?, None));
         }
         let start = how.blocks.unwrap_or(LARGEST_BLOCK);
         let picture = Progressive::new(engine, world, description, camera, options, start)?;

@@ -18,7 +18,7 @@ use crate::film::Window;
 use crate::film::exr::ImageInfo;
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
-use crate::render::{Aov, Progress, RenderOptions};
+use crate::render::{Aov, Keeper, Progress, RenderOptions};
 use crate::scene::description::{Description, Precision};
 use crate::scene::load::{ReadMesh, read_mesh};
 use crate::scene::world::World;
@@ -118,8 +118,9 @@ pub struct RenderArgs {
     /// on are written; a frame that is stopped is not
     #[arg(long, value_name = "A..B", value_parser = frames::frames)]
     frames: Option<frames::Frames>,
-    /// Leave out frames whose files exist
-    #[arg(long, requires = "frames")]
+    /// Keep finished tiles beside the picture, in NAME.tiles, until it is whole, and go on from those that the same command left there
+    /// when it was stopped or killed; with --frames also leave out frames whose files exist
+    #[arg(long)]
     resume: bool,
     #[command(flatten)]
     preview: PreviewArgs,
@@ -149,6 +150,11 @@ impl RenderArgs {
     /// The first file to write.
     fn file(&self) -> String {
         self.files.first().map(|file| file.path.display().to_string()).unwrap_or_default()
+    }
+
+    /// Whether finished tiles are kept: those of pictures that are made tile by tile.
+    fn keeps_tiles(&self) -> bool {
+        self.resume && self.noise.is_none() && self.time_limit.is_none() && !self.preview.by_blocks()
     }
 
     /// Whether all that is wanted of the picture are the levels of `.pix` files.
@@ -278,6 +284,11 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         count: args.output.verbose > 0,
     };
     options.check()?;
+    if args.resume && args.frames.is_none() && !args.keeps_tiles() {
+        let what = "--resume goes with a fixed number of samples, and without previews: expected no --noise, --time-limit, --preview \
+                    or --blocks";
+        return Err(Error::Usage(what.into()));
+    }
     let holds_planes = |file: &Target| !matches!(file.format, Format::Png | Format::Pix);
     if !options.aovs.is_empty() && !args.files.iter().any(holds_planes) {
         return Err(Error::Usage("PNG and .pix hold colours only: --aov needs .exr or .npy".into()));
@@ -298,18 +309,39 @@ fn picture<S: Shades>(
     let camera_args = if args.rt_compat { args.camera.or_default_view() } else { args.camera.clone() };
     let camera = camera_args.ready(description, world.bounds(), (width, height))?;
     let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
+    let keeper = args.keeps_tiles().then(|| {
+        // Whatever decides about bits, and what is counted.
+        let of = format!(
+            "{REVISION} {} {} {} {} {:?} {camera:?} {options:?}",
+            compiled_isa(),
+            description.hash,
+            engine.name(),
+            S::PRECISION,
+            args.scene.options.build(),
+        );
+        Keeper::new(format!("{}.tiles", args.file()).into(), &of)
+    });
     let job = Job {
         engine,
         world,
         description,
         camera: &camera,
         options,
+        keeper: keeper.as_ref(),
         exposure: args.exposure,
         name: &args.file(),
         output: &args.output,
     };
     let (output, window) = job.render(&args.preview, &watch)?;
     watch.bar.finish_and_clear();
+    if let Some(keeper) = &keeper {
+        if keeper.found() > 0 {
+            args.output.say(&format!("{} of {} tiles were kept from before", keeper.found(), output.tiles_total));
+        }
+        if let Some(trouble) = keeper.trouble() {
+            args.output.say(&format!("warning: finished tiles are not kept any more: {trouble}"));
+        }
+    }
     let info = ImageInfo {
         software: concat!("lanecast ", env!("CARGO_PKG_VERSION")).into(),
         revision: REVISION.into(),
@@ -328,6 +360,9 @@ fn picture<S: Shades>(
     // Without a finished tile there is nothing to show, and an older picture is worth more.
     if output.is_complete() || partly && output.tiles_done > 0 {
         args.files.iter().try_for_each(|file| write(file, &output.film, &info, args.exposure))?;
+    }
+    if let (true, Some(keeper)) = (output.is_complete(), &keeper) {
+        keeper.remove()?;
     }
     let stats = world.stats();
     let (engine, precision, build_seconds) = (engine.name(), S::PRECISION, stats.build_seconds);

@@ -2,7 +2,7 @@
 
 /// Counts of one traversal run. "Lane" counts are sums over tests of (active, total) lanes, so lane use is
 /// `active / total`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Counters {
     /// Rays traced (live ones).
     pub rays: u64,

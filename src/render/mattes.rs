@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use super::aov::Aov;
+use super::kept::Names;
 use crate::camera::Passes;
 use crate::error::locked;
 use crate::film::{Film, Plane, PlaneData, Window, cryptomatte};
@@ -42,7 +43,7 @@ pub(super) struct Mattes<'a> {
     /// First of the film's planes that are mattes.
     first_plane: usize,
     /// What was seen: names and ids, by layer.
-    seen: Mutex<[BTreeMap<String, u32>; 2]>,
+    seen: Mutex<Names>,
 }
 
 impl<'a> Mattes<'a> {
@@ -114,8 +115,15 @@ impl<'a> Mattes<'a> {
         format!("{}{gap}{name}{place}", object.name)
     }
 
-    /// Writes the ranks of those of `pixels` that lie in `window` to `film`; each had `count` samples.
-    pub fn paint(&self, film: &mut Film, window: Window, pixels: &[(u32, u32)], coverages: &[Coverage], count: u32) {
+    /// Writes the ranks of those of `pixels` that lie in `window` to `film`; each had `count` samples. Returns the names.
+    pub fn paint(
+        &self,
+        film: &mut Film,
+        window: Window,
+        pixels: &[(u32, u32)],
+        coverages: &[Coverage],
+        count: u32,
+    ) -> Names {
         let mut names: [BTreeMap<Thing, (String, u32)>; 2] = Default::default();
         for (&(x, y), coverage) in pixels.iter().zip(coverages) {
             let Some(place) = window.index(x, y) else { continue };
@@ -143,9 +151,15 @@ impl<'a> Mattes<'a> {
                 }
             }
         }
-        let mut seen = locked(&self.seen);
-        for (all, found) in seen.iter_mut().zip(names) {
-            all.extend(found.into_values());
+        let names = names.map(|found| found.into_values().collect());
+        self.note(&names);
+        names
+    }
+
+    /// Notes names that were seen.
+    pub fn note(&self, names: &Names) {
+        for (all, found) in locked(&self.seen).iter_mut().zip(names) {
+            all.extend(found.iter().map(|(name, id)| (name.clone(), *id)));
         }
     }
 

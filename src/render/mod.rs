@@ -2,6 +2,7 @@
 
 mod aov;
 mod canvas;
+mod kept;
 mod mattes;
 mod options;
 mod patch;
@@ -12,5 +13,6 @@ mod sums;
 mod tally;
 
 pub use aov::Aov;
+pub use kept::Keeper;
 pub use options::{Progress, RenderOptions, Silent};
-pub use scheduler::{RenderOutput, render, render_with};
+pub use scheduler::{RenderOutput, render, render_kept, render_with};

@@ -6,13 +6,14 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::canvas::{Canvas, Memory};
+use super::kept::{Keeper, Kept, Names};
 use super::mattes::{Coverage, Mattes};
 use super::options::{Progress, RenderOptions, rect_of};
 use super::patch::{Channels, empty_film};
 use super::sums::{Finished, Sums};
 use super::tally::Tally;
 use crate::camera::Camera;
-use crate::error::{Result, locked};
+use crate::error::{Error, Result, locked};
 use crate::film::Film;
 use crate::film::Window;
 use crate::ray::Counters;
@@ -80,27 +81,61 @@ pub fn render_with<S: Shades>(
     options: &RenderOptions,
     progress: &dyn Progress,
 ) -> Result<RenderOutput> {
+    render_kept(engine, world, description, camera, options, progress, None)
+}
+
+/// As [`render_with`], but finished tiles are kept in a file from which the same picture goes on when it was stopped, with the same
+/// bits; what its file holds counts as rendered, with the rays and the time that it took.
+///
+/// # Errors
+/// Options out of range; tiles to be kept of a picture whose number of samples is found while it is rendered; a file that cannot be
+/// used or holds tiles of another picture.
+pub fn render_kept<S: Shades>(
+    engine: &dyn Engine<S>,
+    world: &World<S>,
+    description: &Description,
+    camera: &Camera,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+    keeper: Option<&Keeper>,
+) -> Result<RenderOutput> {
     let (tiling, window) = options.check()?;
+    if keeper.is_some() && options.is_adaptive() {
+        let what = "tiles are kept of pictures with a fixed number of samples only: neither noise nor a time limit";
+        return Err(Error::Usage(what.into()));
+    }
     let start = Instant::now();
     let shader =
         Shader::new(world, description, engine, headlight(camera), options.settings()).with_rt(description, camera);
     let channels = Channels::new(options);
     let mut film = empty_film((options.width, options.height), window, &channels);
     let mattes = Mattes::new(world, description, &options.aovs, &mut film);
-    let film = Mutex::new(film);
     let canvas = Canvas { camera, options, tiling, rect: rect_of(window) };
-    let tiles = tiling.tiles_in(canvas.rect);
+    let mut tiles = tiling.tiles_in(canvas.rect);
+    let total = tiles.len() as u64;
+    let mut kept = keeper.map(|keeper| keeper.open(&mut film, &tiling, &tiles)).transpose()?;
+    let (seconds, before, names) = kept.as_mut().map(Kept::before).unwrap_or_default();
+    if let Some(kept) = &kept {
+        tiles.retain(|number| !kept.done.contains(number));
+        kept.done.iter().for_each(|_| progress.tile_done(total));
+    }
+    if let Some(mattes) = &mattes {
+        mattes.note(&names);
+    }
+    let film = Mutex::new(film);
     let job = Job { shader, canvas, window, channels, mattes, progress, start };
     let paint = |tile: &Tile, memory: &mut Memory<S>| {
         job.fill(tile, memory);
         let mut film = locked(&film);
         memory.patch.paint(&mut film);
+        let mut names = Names::default();
         if let Some(mattes) = &job.mattes {
             job.canvas.list_pixels(tile.number, memory);
-            mattes.paint(&mut film, window, &memory.pixels, &tile.coverages, tile.count);
+            names = mattes.paint(&mut film, window, &memory.pixels, &tile.coverages, tile.count);
         }
         drop(film);
-        progress.tile_done(tiles.len() as u64);
+        progress.tile_done(total);
+        names
     };
     let tally = if options.is_adaptive() {
         job.rounds(&tiles, paint)
@@ -108,14 +143,20 @@ pub fn render_with<S: Shades>(
         let one_tile = |(memory, tile): &mut (Memory<S>, Tile), &number: &u32| {
             tile.start(number);
             let finished = job.samples(tile, options.spp, memory);
+            let tally = Tally::take(&mut memory.work, u64::from(finished));
             if finished {
-                paint(tile, memory);
+                let names = paint(tile, memory);
+                if let Some(kept) = &kept {
+                    let so_far = seconds + start.elapsed().as_secs_f64();
+                    kept.keep((number, &tiling), &film, (so_far, &tally, names));
+                }
             }
-            Tally::take(&mut memory.work, u64::from(finished))
+            tally
         };
         let memory = || (Memory::default(), job.tile());
         tiles.par_iter().map_init(memory, one_tile).reduce(Tally::default, Tally::plus)
-    };
+    }
+    .plus(before);
     let mut film = film.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
     if let Some(mattes) = job.mattes {
         mattes.finish(&mut film);
@@ -123,11 +164,11 @@ pub fn render_with<S: Shades>(
     Ok(RenderOutput {
         film,
         rays: tally.rays,
-        seconds: start.elapsed().as_secs_f64(),
+        seconds: seconds + start.elapsed().as_secs_f64(),
         counters: tally.counters,
         paths: tally.paths,
         tiles_done: tally.done,
-        tiles_total: tiles.len() as u64,
+        tiles_total: total,
     })
 }
 
@@ -199,7 +240,7 @@ impl<S: Shades> Job<'_, S> {
 
     /// Rounds over all tiles, each doubling the samples, until all have the wanted samples or little noise, or the
     /// time is over. Then calls `paint` for each tile that has samples.
-    fn rounds(&self, tiles: &[u32], paint: impl Fn(&Tile, &mut Memory<S>) + Sync) -> Tally {
+    fn rounds(&self, tiles: &[u32], paint: impl Fn(&Tile, &mut Memory<S>) -> Names + Sync) -> Tally {
         let (spp, limit) = (self.canvas.options.spp, self.canvas.options.time_limit.unwrap_or(f64::INFINITY));
         let in_time = || self.start.elapsed().as_secs_f64() < limit;
         let mut states: Vec<(Tile, bool)> =

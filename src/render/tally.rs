@@ -7,7 +7,7 @@ use crate::ray::Counters;
 use crate::shade::{PathStats, RayCounts, Workspace};
 
 /// Counts of some tiles or batches.
-#[derive(Default)]
+#[derive(Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Tally {
     /// Finished ones.
     pub done: u64,

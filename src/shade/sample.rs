@@ -101,7 +101,7 @@ impl Samples {
 }
 
 /// Live rays traced, by kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct RayCounts {
     /// From the camera.
     pub primary: u64,

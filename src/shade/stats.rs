@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::sample::RayCounts;
 
 /// What one bounce took.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct BounceStats {
     /// Rays traced for closest hits.
     pub rays: u64,
@@ -24,7 +24,7 @@ pub struct BounceStats {
 }
 
 /// What all bounces took, over all threads. Times of different threads add up.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct PathStats {
     /// By number of the bounce, 0 for primary rays.
     pub bounces: Vec<BounceStats>,

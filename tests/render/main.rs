@@ -8,6 +8,7 @@ mod common;
 mod determinism;
 mod frames;
 mod joined;
+mod kept;
 mod offsets;
 mod progressive;
 mod shading;
