@@ -71,9 +71,9 @@ impl<'a, S: Real> Lights<'a, S> {
         }
     }
 
-    /// The light that `choice` in [0, 1) falls on, its kind and its chance.
+    /// The light that the bits `choice` fall on, its kind and its chance.
     #[inline(always)]
-    pub fn choose(&self, choice: f64) -> Option<(usize, Kind, S)> {
+    pub fn choose(&self, choice: u32) -> Option<(usize, Kind, S)> {
         let index = self.alias.choose(choice)?;
         let (kind, chance) = self.kinds[index];
         Some((index, kind, chance))
@@ -87,7 +87,7 @@ impl<'a, S: Real> Lights<'a, S> {
 
     /// Whether nothing can be aimed at.
     pub fn is_empty(&self) -> bool {
-        self.alias.choose(0.0).is_none()
+        self.alias.choose(0).is_none()
     }
 
     /// Aims from `from` at light `index`.

@@ -28,7 +28,8 @@ struct Numbers<S> {
     place: [Column<S>; 2],
     choice: Column<S>,
     light: [Column<S>; 2],
-    light_choice: Column<S>,
+    /// All 32 bits: a fraction has too few digits to choose among many.
+    light_choice: [u32; MAX_LANES],
     roulette: Column<S>,
 }
 
@@ -44,33 +45,30 @@ impl Chances<'_> {
     /// Those of lights only where some `aims` at them.
     fn numbers<S: Real>(&self, path: &[u32], aims: bool) -> Numbers<S> {
         let zero = [S::ZERO; MAX_LANES];
-        let mut numbers =
-            Numbers { place: [zero; 2], choice: zero, light: [zero; 2], light_choice: zero, roulette: zero };
+        let light_choice = [0; MAX_LANES];
+        let mut numbers = Numbers { place: [zero; 2], choice: zero, light: [zero; 2], light_choice, roulette: zero };
         let mut keys = [Draw::default(); MAX_LANES];
         for (key, &path) in keys.iter_mut().zip(path) {
             *key = self.draws[path as usize];
         }
         let first = CAMERA_PAIRS + self.bounce * PAIRS;
-        let fill = |pair: u32, x: &mut Column<S>, y: &mut Column<S>| {
+        let bits = |pair: u32| {
             let mut bits = [[0; MAX_LANES]; 2];
             for lane in 0..MAX_LANES {
                 let both = keys[lane].points.bits(keys[lane].sample, first + pair);
                 (bits[0][lane], bits[1][lane]) = (both[0], both[1]);
             }
-            for lane in 0..MAX_LANES {
-                x[lane] = S::from_f64(fraction(bits[0][lane]));
-                y[lane] = S::from_f64(fraction(bits[1][lane]));
-            }
+            bits
         };
-        let [x, y] = &mut numbers.place;
-        fill(0, x, y);
+        let fractions = |bits: [u32; MAX_LANES]| bits.map(|bits| S::from_f64(fraction(bits)));
+        numbers.place = bits(0).map(fractions);
         if aims {
-            let [x, y] = &mut numbers.light;
-            fill(1, x, y);
+            numbers.light = bits(1).map(fractions);
         }
-        fill(2, &mut numbers.light_choice, &mut numbers.choice);
+        let [light_choice, choice] = bits(2);
+        (numbers.light_choice, numbers.choice) = (light_choice, fractions(choice));
         if self.bounce >= FIRST_ROULETTE {
-            fill(3, &mut numbers.roulette, &mut [S::ZERO; MAX_LANES]);
+            numbers.roulette = fractions(bits(3)[0]);
         }
         numbers
     }
@@ -169,8 +167,7 @@ impl<S: Real> Paths<'_, S> {
         numbers: &Numbers<S>,
         shadows: &mut Shadows<S>,
     ) {
-        let chosen = [numbers.light[0], numbers.light[1], numbers.light_choice];
-        let target = self.targets(packet.place.position, path.len(), &chosen);
+        let target = self.targets(packet.place.position, path.len(), &numbers.light, &numbers.light_choice);
         let one = S::Wide::constant(1.0);
         let local = packet.frame.to_local(target.dir);
         let (org, is_consistent) = packet.leave(target.dir, local);

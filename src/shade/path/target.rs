@@ -38,15 +38,21 @@ pub(super) struct Targets<V: Lanes> {
 type Mask<S> = <<S as Real>::Wide as Lanes>::Mask;
 
 impl<S: Real> Paths<'_, S> {
-    /// Something that shines for each of the first `count` points of a packet at `from`, by the numbers `u`: two for the
-    /// place, one for the choice.
+    /// Something that shines for each of the first `count` points of a packet at `from`: which by the bits `choice`, where on
+    /// it by the numbers `u`.
     #[inline(always)]
-    pub(super) fn targets(&self, from: Lanes3<S::Wide>, count: usize, u: &[Column<S>; 3]) -> Targets<S::Wide> {
+    pub(super) fn targets(
+        &self,
+        from: Lanes3<S::Wide>,
+        count: usize,
+        u: &[Column<S>; 2],
+        choice: &[u32; MAX_LANES],
+    ) -> Targets<S::Wide> {
         let all = (1 << count.min(MAX_LANES)) - 1;
         let (mut which, mut kinds, mut chance) = ([0; MAX_LANES], [0; MAX_LANES], [S::ONE; MAX_LANES]);
         // Nothing branches on what is chosen: it is a surprise every time.
         for lane in 0..count.min(MAX_LANES) {
-            let Some((index, kind, its)) = self.lights.choose(u[2][lane].to_f64()) else { break };
+            let Some((index, kind, its)) = self.lights.choose(choice[lane]) else { break };
             (which[lane], kinds[lane], chance[lane]) = (index as u32, kind as u32, its);
         }
         let of_kind = |kind: Kind| positions(&kinds, kind as u32) & all;
@@ -79,7 +85,7 @@ impl<S: Real> Paths<'_, S> {
         &self,
         from: Lanes3<S::Wide>,
         which: &[u32; MAX_LANES],
-        u: &[Column<S>; 3],
+        u: &[Column<S>; 2],
         lanes: u32,
         targets: &Targets<S::Wide>,
     ) -> Targets<S::Wide> {
