@@ -2,6 +2,7 @@
 
 mod aov;
 mod canvas;
+mod enough;
 mod kept;
 mod mattes;
 mod options;

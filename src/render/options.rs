@@ -31,7 +31,8 @@ pub struct RenderOptions {
     pub filter: Filter,
     /// Stop adding samples after that many seconds (not before the first one of each pixel).
     pub time_limit: Option<f64>,
-    /// Stop adding samples to a tile when the error of its mean brightness, relative, is estimated below this.
+    /// Stop adding samples to a tile when the error of its mean brightness, relative, is estimated below this; of paths, those
+    /// of the tiles around it too, and not before there are samples enough to tell.
     pub noise: Option<f64>,
     /// Seed of the random numbers.
     pub seed: u64,

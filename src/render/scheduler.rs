@@ -6,6 +6,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::canvas::{Canvas, Memory};
+use super::enough::{Evidence, FIRST_ROUND, are_enough};
 use super::kept::{Keeper, Kept, Names};
 use super::mattes::{Coverage, Mattes};
 use super::options::{Progress, RenderOptions, rect_of};
@@ -19,11 +20,8 @@ use crate::film::Window;
 use crate::ray::Counters;
 use crate::scene::description::Description;
 use crate::scene::world::World;
-use crate::shade::{PathStats, RayCounts, Shader, Shades, headlight};
+use crate::shade::{Integrator, PathStats, RayCounts, Shader, Shades, headlight};
 use crate::trace::{Engine, engine};
-
-/// Samples per pixel of the first round when the number is found while rendering; then it doubles.
-const FIRST_ROUND: u32 = 4;
 
 /// A picture and what it took.
 #[derive(Clone, Debug)]
@@ -194,6 +192,14 @@ struct Tile {
     coverages: Vec<Coverage>,
 }
 
+/// A tile between rounds.
+struct State {
+    tile: Tile,
+    /// What its samples tell; unknown unless a noise level is asked for.
+    evidence: Evidence,
+    is_done: bool,
+}
+
 impl Tile {
     /// Makes it tile number `number`, without samples.
     fn start(&mut self, number: u32) {
@@ -241,17 +247,20 @@ impl<S: Shades> Job<'_, S> {
     /// Rounds over all tiles, each doubling the samples, until all have the wanted samples or little noise, or the
     /// time is over. Then calls `paint` for each tile that has samples.
     fn rounds(&self, tiles: &[u32], paint: impl Fn(&Tile, &mut Memory<S>) -> Names + Sync) -> Tally {
-        let (spp, limit) = (self.canvas.options.spp, self.canvas.options.time_limit.unwrap_or(f64::INFINITY));
+        let options = self.canvas.options;
+        let (spp, limit) = (options.spp, options.time_limit.unwrap_or(f64::INFINITY));
         let in_time = || self.start.elapsed().as_secs_f64() < limit;
-        let mut states: Vec<(Tile, bool)> =
-            tiles.iter().map(|&number| (Tile { number, ..self.tile() }, false)).collect();
+        let state =
+            |&number| State { tile: Tile { number, ..self.tile() }, evidence: Evidence::default(), is_done: false };
+        let mut states: Vec<State> = tiles.iter().map(state).collect();
         let mut total = Tally::default();
         let mut target = FIRST_ROUND.min(spp);
         loop {
-            let one_tile = |memory: &mut Memory<S>, (tile, is_done): &mut (Tile, bool)| {
-                if *is_done {
+            let one_tile = |memory: &mut Memory<S>, state: &mut State| {
+                if state.is_done {
                     return Tally::default();
                 }
+                let tile = &mut state.tile;
                 // The first samples are made even when the time is over: every pixel has some.
                 while tile.count < target && (tile.count == 0 || in_time()) {
                     let next = target.min(tile.count + self.shader.passes(tile.count));
@@ -259,18 +268,29 @@ impl<S: Shades> Job<'_, S> {
                         break;
                     }
                 }
-                let is_even = |noise| tile.count >= FIRST_ROUND && tile.sums.error(tile.count) <= noise;
-                *is_done = self.canvas.options.noise.is_some_and(is_even);
-                Tally::take(&mut memory.work, 0)
+                let tally = Tally::take(&mut memory.work, 0);
+                if options.noise.is_some() {
+                    let RayCounts { shadow, scattered, .. } = tally.rays;
+                    let scatters = options.integrator == Integrator::Path && shadow + scattered > 0;
+                    state.evidence = Evidence {
+                        count: tile.count,
+                        error: tile.sums.error(tile.count),
+                        scatters: state.evidence.scatters || scatters,
+                    };
+                }
+                tally
             };
             let round = states.par_iter_mut().map_init(Memory::default, one_tile);
             total = total.plus(round.reduce(Tally::default, Tally::plus));
-            if target >= spp || !in_time() || self.progress.stopped() || states.iter().all(|(_, is_done)| *is_done) {
+            if let Some(noise) = options.noise {
+                self.judge(&mut states, noise);
+            }
+            if target >= spp || !in_time() || self.progress.stopped() || states.iter().all(|state| state.is_done) {
                 break;
             }
             target = target.saturating_mul(2).min(spp);
         }
-        let finished = |memory: &mut Memory<S>, (tile, _): &mut (Tile, bool)| {
+        let finished = |memory: &mut Memory<S>, State { tile, .. }: &mut State| {
             if tile.count == 0 {
                 return Tally::default();
             }
@@ -279,6 +299,13 @@ impl<S: Shades> Job<'_, S> {
         };
         let painted = states.par_iter_mut().map_init(Memory::default, finished);
         total.plus(painted.reduce(Tally::default, Tally::plus))
+    }
+
+    /// Says which tiles are done, for now: what a tile finds may open the tiles around it again.
+    fn judge(&self, states: &mut [State], noise: f64) {
+        let known: Vec<_> = states.iter().map(|state| (state.tile.number, state.evidence)).collect();
+        let enough = are_enough(&known, &self.canvas.tiling, noise);
+        states.iter_mut().zip(enough).for_each(|(state, enough)| state.is_done = enough);
     }
 
     /// Takes what the planes get from a finished tile.

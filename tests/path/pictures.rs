@@ -164,6 +164,38 @@ fn planes_add_up() {
     assert!(values(&film, "direct.G").iter().all(|&x| x == 2.0) && values(&film, "variance").iter().all(|&x| x == 0.0));
 }
 
+/// A lamp that no path aims at (a sphere that is none by a hair) over a floor that ends within the picture: tiles whose first
+/// samples found no light go on, those that show nothing end at once.
+#[test]
+fn a_noise_limit_does_not_give_up_light_that_is_found_by_chance() {
+    let (height, radius, edge) = (2.0, 0.12, 0.3);
+    let mut d = dark();
+    let floor = add(&mut d, Material { diffuse: DVec3::splat(0.6), ..Material::default() });
+    let shining = add(&mut d, lamp(100.0));
+    parallelogram(&mut d, DVec3::new(-3.0, -3.0, 0.0), DVec3::X * 6.0, DVec3::Y * (3.0 + edge), floor);
+    let map = DMat3::from_diagonal(DVec3::new(radius, radius, radius * 1.0001));
+    shape(&mut d, Shape::Sphere, DAffine3::from_mat3_translation(map, DVec3::Z * height), shining);
+    // Seen under 60 degrees: x from -2 to 2, y from -1 to 1.
+    let camera = path_support::parallel(DVec3::new(0.75f64.sqrt(), 0.0, 0.5) * 4.0, DVec3::ZERO, 2.0);
+    let options = RenderOptions { noise: Some(1.4), aovs: vec![Aov::Samples], ..paths(24, 4096, 1) };
+    let film = picture::<f32>(&d, &camera, &options).film;
+    // A sphere above the horizon shines as if from its centre, by the square of its radius.
+    const STEPS: u32 = 200;
+    let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(STEPS) - 0.5;
+    let mut want = 0.0;
+    for (x, y) in (0..STEPS * STEPS).map(|i| (4.0 * middle(i % STEPS), 2.0 * middle(i / STEPS))) {
+        if y < edge {
+            want += 0.6 * 100.0 * radius * radius * height / (x * x + y * y + height * height).powf(1.5);
+        }
+    }
+    want /= f64::from(STEPS * STEPS);
+    // Each of the six tiles of the floor ends with at least 33 paths that found the lamp, most with many more.
+    path_support::near("by chance", path_support::mean(&film), DVec3::splat(want), 0.12);
+    let samples = film.u32_plane("samples").unwrap();
+    let (nothing, lit) = samples.split_at(8 * 24);
+    assert!(nothing.iter().all(|&n| n == 4) && lit.iter().all(|&n| n >= 64), "{nothing:?} {lit:?}");
+}
+
 #[test]
 fn no_pixel_of_a_built_in_scene_is_out_of_bounds() {
     for name in builtin::NAMES {
