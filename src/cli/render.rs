@@ -22,7 +22,7 @@ use crate::render::{Aov, Keeper, Progress, RenderOptions};
 use crate::scene::description::{Description, Precision};
 use crate::scene::load::{ReadMesh, read_mesh};
 use crate::scene::world::World;
-use crate::shade::{Integrator, Shades, unknown_shaders};
+use crate::shade::{Integrator, Shades, unaimed, unknown_shaders};
 
 /// Picture size unless `--size` says otherwise.
 const DEFAULT_SIZE: (u32, u32) = (960, 540);
@@ -253,6 +253,16 @@ fn check_rt(args: &RenderArgs, description: &Description) -> Result<()> {
     Ok(())
 }
 
+/// Says that `count` emitting surfaces are too many to be aimed at, and what helps.
+fn warn_of_unaimed(args: &RenderArgs, count: u64) {
+    if count > 0 {
+        let what = format!("{count} emitting triangles and shapes are copies beyond those that paths aim at");
+        args.output.say(&format!(
+            "warning: {what}: their light is found by chance only, with more noise; place fewer of them"
+        ));
+    }
+}
+
 /// The options, checked before a long build starts.
 fn options(args: &RenderArgs) -> Result<RenderOptions> {
     let (width, height) = args.camera.size.unwrap_or(if args.rt_compat { RT_SIZE } else { DEFAULT_SIZE });
@@ -308,6 +318,9 @@ fn picture<S: Shades>(
     let (width, height) = (options.width, options.height);
     let camera_args = if args.rt_compat { args.camera.or_default_view() } else { args.camera.clone() };
     let camera = camera_args.ready(description, world.bounds(), (width, height))?;
+    if options.integrator == Integrator::Path {
+        warn_of_unaimed(args, unaimed(world, description));
+    }
     let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
     let keeper = args.keeps_tiles().then(|| {
         // Whatever decides about bits, and what is counted.

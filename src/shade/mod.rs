@@ -36,6 +36,7 @@ pub use compiled::Shades;
 pub use integrator::Integrator;
 pub use lights::headlight;
 pub use offset::{offset_origin, position_error};
+pub use path::unaimed;
 pub use rt::unknown_shaders;
 pub use sample::{FirstHit, RayCounts, Rgba, Samples};
 pub use shader::{Settings, Shader, Workspace};

@@ -8,14 +8,11 @@ use super::alias::Alias;
 use super::emitter::{Aim, Emitter};
 use super::form::{Form, Kind};
 use super::sky::Sky;
+use super::surfaces::Surfaces;
 use crate::lanes::Real;
-use crate::scene::assembly::{Part, PartKind};
-use crate::scene::description::{Description, Light, Shape};
+use crate::scene::description::{Description, Light};
 use crate::scene::world::World;
 use crate::shade::look::Looks;
-
-/// Emitting primitives of an object: first primitive, number, and how many of the object come before.
-type Run = (u32, u32, u32);
 
 /// Everything that shines.
 pub struct Lights<'a, S> {
@@ -25,10 +22,8 @@ pub struct Lights<'a, S> {
     /// Parallel to them: kind and chance.
     kinds: Vec<(Kind, S)>,
     alias: Alias,
-    /// Per placement: the number of its first emitting primitive in the list; `u32::MAX` if it has none.
-    first: Vec<u32>,
-    /// Per object.
-    runs: Vec<Vec<Run>>,
+    /// Those of the list that come first.
+    surfaces: Surfaces,
     /// Index of the sky in the list.
     sky_index: usize,
     sky: Option<Sky<'a>>,
@@ -41,7 +36,12 @@ impl<'a, S: Real> Lights<'a, S> {
     /// The lights of `description` and the emitting surfaces of `world`; where nothing shines, a sky of radiance 1 in
     /// all directions.
     pub fn new(world: &World<S>, description: &'a Description, looks: &Looks<'_>) -> Self {
-        let (runs, first, mut emitters) = surfaces(world, looks);
+        Self::of(Surfaces::new(world, looks), world, description, looks)
+    }
+
+    /// The same with `surfaces` as those that are aimed at.
+    pub fn of(surfaces: Surfaces, world: &World<S>, description: &'a Description, looks: &Looks<'_>) -> Self {
+        let mut emitters = surfaces.emitters(world);
         emitters.extend(description.lights.iter().map(|&light| Emitter::Light(light)));
         let is_dark = emitters.is_empty() && description.environment.is_none() && description.background == DVec3::ZERO;
         let is_sun = |e: &Emitter| matches!(e, Emitter::Light(Light::Sun { .. }));
@@ -62,8 +62,7 @@ impl<'a, S: Real> Lights<'a, S> {
             kinds: forms.iter().enumerate().map(kind).collect(),
             forms,
             alias,
-            first,
-            runs,
+            surfaces,
             sky_index,
             sky,
             suns,
@@ -107,18 +106,10 @@ impl<'a, S: Real> Lights<'a, S> {
     /// Density with which [`Self::aim`] from `from` finds the hit at `to`, unit geometric normal `ng`, on primitive
     /// `prim` of instance `inst`: per solid angle; 0 if it never does.
     pub fn pdf_of_hit(&self, from: DVec3, to: DVec3, ng: DVec3, prim: u32, inst: u32, world: &World<S>) -> f64 {
-        let first = self.first[inst as usize];
-        if first == u32::MAX {
-            return 0.0;
-        }
-        let runs = &self.runs[world.assembly.placements[inst as usize].object as usize];
-        let after = runs.partition_point(|run| run.0 <= prim);
-        let Some(&(start, count, before)) = after.checked_sub(1).map(|i| &runs[i]) else { return 0.0 };
-        if prim - start >= count {
-            return 0.0;
-        }
-        let index = (first + before + prim - start) as usize;
-        self.alias.chance(index) * self.emitters[index].pdf(from, to, ng)
+        let object = world.assembly.placements[inst as usize].object;
+        self.surfaces
+            .index(prim, inst, object)
+            .map_or(0.0, |i| self.alias.chance(i) * self.emitters[i].pdf(from, to, ng))
     }
 
     /// Radiance of all rays that leave the scene, and the density per solid angle with which [`Self::aim`] finds it, where
@@ -148,58 +139,6 @@ impl<'a, S: Real> Lights<'a, S> {
             }
         }
         sum
-    }
-}
-
-/// The emitting runs of each object, where each placement's primitives begin in the list, and the list.
-fn surfaces<S: Real>(world: &World<S>, looks: &Looks<'_>) -> (Vec<Vec<Run>>, Vec<u32>, Vec<Emitter>) {
-    let assembly = &world.assembly;
-    let emits = |object: usize, prim: u32| looks.shines(world.material(object as u32, prim));
-    let runs: Vec<Vec<Run>> = (0..assembly.objects.len())
-        .map(|object| {
-            let mut list: Vec<Run> = Vec::new();
-            let mut before = 0;
-            for (start, end) in world.material_runs(object as u32) {
-                if start < end && emits(object, start) {
-                    list.push((start, end - start, before));
-                    before += end - start;
-                }
-            }
-            list
-        })
-        .collect();
-    let mut emitters = Vec::new();
-    let first = assembly
-        .placements
-        .iter()
-        .enumerate()
-        .map(|(inst, placement)| {
-            let list = &runs[placement.object as usize];
-            if list.is_empty() {
-                return u32::MAX;
-            }
-            let first = emitters.len() as u32;
-            for &(start, count, _) in list {
-                for prim in start..start + count {
-                    let part = assembly.part_of(placement.object, prim);
-                    let to_world = placement.to_world * part.to_object;
-                    emitters.push(surface(part, prim, inst as u32, world.material(placement.object, prim), &to_world));
-                }
-            }
-            first
-        })
-        .collect();
-    (runs, first, emitters)
-}
-
-fn surface(part: &Part, prim: u32, inst: u32, material: u32, to_world: &glam::DAffine3) -> Emitter {
-    match &part.kind {
-        PartKind::Mesh(mesh) => {
-            Emitter::triangle(to_world, mesh.corners((prim - part.first_prim) as usize), material, prim, inst)
-        }
-        PartKind::Shape(Shape::Sphere) => Emitter::sphere(to_world, material, [prim, inst]),
-        PartKind::Shape(Shape::Disc) => Emitter::disc(to_world, material, [prim, inst]),
-        _ => Emitter::Unaimed,
     }
 }
 

@@ -20,6 +20,7 @@ mod lights;
 mod points;
 mod scatter;
 mod sky;
+mod surfaces;
 mod target;
 pub(super) mod wave;
 
@@ -30,6 +31,7 @@ use glam::DVec3;
 
 pub(super) use self::bsdf::facets::Rough;
 pub(super) use self::bsdf::fresnel;
+pub use self::surfaces::unaimed;
 
 use self::arrival::{Arrival, Seen};
 use self::bsdf::facets::FacetsList;
