@@ -6,13 +6,14 @@ mod gltf_support;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::path::Path;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat2, DVec2, DVec3};
 use gltf_support::{ONE_MESH, TRIANGLE, document, floats, glb, parse, refusal, scene, shared};
 use lanecast::scene::description::{Description, Light, Material};
 use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::material::{Alpha, Scattering, TextureRef, Wrap};
 use lanecast::scene::pictures::{Curve, decode};
 use lanecast::scene::texture::Texels;
+use lanecast::scene::world::{Preset, World};
 
 /// A PNG of 2 x 2 texels: red, green, blue, white at half opacity.
 const PIXELS: [[u8; 4]; 4] = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 128]];
@@ -165,6 +166,42 @@ fn lights_shine_along_minus_z_of_their_nodes() {
 
 fn light_of_node(i: u32) -> String {
     format!(r#""extensions": {{"KHR_lights_punctual": {{"light": {i}}}}}"#)
+}
+
+/// Right and up in the picture on a triangle: the same whether normals go along with the winding (`z` is 1) or against it, with
+/// tangents or without, and mirrored with the node.
+#[test]
+fn normal_maps_stand_upright_whichever_way_normals_point() {
+    let uri = data_uri(&png(&PIXELS));
+    for (z, with_tangents, scale) in
+        [1.0, -1.0].into_iter().flat_map(|z| [(z, false, 1), (z, true, 1), (z, false, -1), (z, true, -1)])
+    {
+        let mut bin = floats(&[-1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 1.0, 0.0]);
+        bin.extend(floats(&[[0.0, 0.0, z]; 3].concat()));
+        bin.extend(floats(&[0.0, 1.0, 1.0, 1.0, 1.0, 0.0]));
+        // The bitangent, normal x tangent times w, is y.
+        bin.extend(floats(&[[1.0, 0.0, 0.0, z]; 3].concat()));
+        let tangents = if with_tangents { r#", "TANGENT": 3"# } else { "" };
+        let rest = format!(
+            r#""nodes": [{{"mesh": 0, "scale": [{scale}, 1, 1]}}], "buffers": [{{"byteLength": 144}}],
+            "materials": [{{"normalTexture": {{"index": 0}}}}], "textures": [{{"source": 0}}],
+            "images": [{{"uri": "{uri}"}}], "meshes": [{{"primitives": [{{"material": 0,
+                "attributes": {{"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2{tangents}}}}}]}}],
+            "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}},
+                {{"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC3"}},
+                {{"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC2"}},
+                {{"bufferView": 3, "componentType": 5126, "count": 3, "type": "VEC4"}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 36}}, {{"buffer": 0, "byteOffset": 36, "byteLength": 36}},
+                {{"buffer": 0, "byteOffset": 72, "byteLength": 24}}, {{"buffer": 0, "byteOffset": 96, "byteLength": 48}}]"#
+        );
+        let world = World::<f64>::compile(&scene(&rest, &bin), Preset::Balanced).unwrap();
+        let inst = world.assembly.placements.len() as u32 - 1;
+        let surface = world.surface(DVec3::Z, DVec3::NEG_Z, 1.0, 0.25, 0.25, 0, inst);
+        let [right, up] = surface.tangents(0, &DMat2::IDENTITY).unwrap();
+        let what = format!("{z} {with_tangents} {scale}: {right} {up}");
+        assert!(surface.ns.distance(DVec3::Z) < 1e-6, "{what}, {}", surface.ns);
+        assert!(right.distance(DVec3::X * f64::from(scale)) < 1e-6 && up.distance(DVec3::Y) < 1e-6, "{what}");
+    }
 }
 
 /// Four vertices: positions, then bytes of normals, tangents and two sets of coordinates; two primitives share them.

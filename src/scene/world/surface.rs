@@ -56,6 +56,8 @@ struct OnTriangle<'a> {
     index: usize,
     weights: [f64; 3],
     to_world: DAffine3,
+    /// Whether the mesh's shading normal is on the other side than the geometric one, and was turned.
+    is_turned: bool,
 }
 
 impl<S: Real> World<S> {
@@ -90,8 +92,10 @@ impl<S: Real> World<S> {
                         placed(through(&part.to_object, size)),
                     )
                 };
-                let on = OnTriangle { mesh, index, weights, to_world };
-                let ns = on.shading_normal().map_or(ng, |ns| if ns.dot(ng) < 0.0 { -ns } else { ns });
+                let mut on = OnTriangle { mesh, index, weights, to_world, is_turned: false };
+                let own = on.shading_normal().unwrap_or(ng);
+                on.is_turned = own.dot(ng) < 0.0;
+                let ns = if on.is_turned { -own } else { own };
                 Surface { position, ng, ns, magnitude, material, on: On::Triangle(on) }
             }
             PartKind::Shape(shape) => {
@@ -253,15 +257,20 @@ impl OnTriangle<'_> {
         Some(corners.map(|uv| DVec2::from(uv.map(f64::from))))
     }
 
-    /// The mesh's own tangent and the sign of its bitangent.
+    /// The mesh's own tangent and the sign of its bitangent, which belongs to the mesh's own normal, turned or not.
     fn tangent(&self) -> Option<(DVec3, f64)> {
         let corners = self.mesh.tangents.corners(self.index, self.vertices())?;
         let local = self.mean(corners.map(|[x, y, z, _]| DVec3::new(x.into(), y.into(), z.into())));
-        let mirrored = self.to_world.matrix3.determinant().signum();
-        Some((self.to_world.transform_vector3(local), f64::from(corners[0][3]) * mirrored))
+        let turned = if self.is_turned { -1.0 } else { 1.0 };
+        Some((self.to_world.transform_vector3(local), f64::from(corners[0][3]) * self.mirrored() * turned))
     }
 
-    /// The direction in which u grows, and on which side of it v grows.
+    /// -1 where the map to the world mirrors, so that it takes products of vectors to the other side; else 1.
+    fn mirrored(&self) -> f64 {
+        self.to_world.matrix3.determinant().signum()
+    }
+
+    /// The direction in which u grows, and on which side of it v grows, seen against the geometric normal.
     fn tangent_by_uv(&self, set: u8) -> Option<(DVec3, f64)> {
         let [a, b, c] = self.uvs(set)?;
         let [p, q, r] = self.mesh.corners(self.index).map(|v| self.to_world.transform_point3(v));
@@ -271,7 +280,7 @@ impl OnTriangle<'_> {
         // glTF's v points down, its bitangent up: coordinates that run against each other.
         (determinant != 0.0).then(|| {
             let down = (e2 * d1.x - e1 * d2.x) * determinant.signum();
-            let side = e1.cross(e2).cross(along).dot(down);
+            let side = e1.cross(e2).cross(along).dot(down) * self.mirrored();
             (along, if side > 0.0 { -1.0 } else { 1.0 })
         })
     }
