@@ -2,8 +2,9 @@
 //!
 //! Integrators work on whole batches, never ray by ray: primary hits give a compact batch of shadow rays per light,
 //! then a compact batch of mirrored and refracted rays, which is the next level's batch. Shading runs in lanes; lanes never
-//! look at each other, and terms are added in an order that depends on the path alone, so a pixel's value does not depend
-//! on what else is in its batch.
+//! look at each other, and terms are added in an order that depends on the path alone, so what becomes of a pixel's hits does not
+//! depend on what else is in its batch. The hits themselves may, by rounding: those of engines that trace a batch with an
+//! arithmetic of its own, as `tile` does.
 
 mod ambient_occlusion;
 mod bare;

@@ -9,7 +9,8 @@
 //! 2013.
 //!
 //! All numbers of a path are functions of its pixel, sample and bounce, and lanes never look at each other, so a
-//! picture does not depend on what else is in a wave.
+//! picture does not depend on what else is in a wave, except for the rounding of hits by engines that trace a batch with
+//! an arithmetic of its own.
 
 mod alias;
 mod arrival;
