@@ -1,5 +1,5 @@
-//! The film: named planes of pixels over a data window, and the files they live in (EXR, PNG, NPY, PIX), and files
-//! of meshes.
+//! The film: named planes of pixels over a data window, the files they live in (EXR, PNG, NPY and PIX; PFM is only read), and
+//! files of meshes.
 //!
 //! All writers go through [`write_atomically`]: a reader sees the old file or the whole new one, never a part.
 //! All readers take hostile input: what a header claims is checked against the file's length before memory is taken.

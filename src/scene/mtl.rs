@@ -2,12 +2,12 @@
 //!
 //! Source: Alias|Wavefront, "MTL material format", 1995, and the PBR extension (Pr, Pm, norm) that exporters write
 //! (Clara.io, 2014). Read are `newmtl`, `Kd`, `Ks`, `Ke`, `Tf`, `Ns`, `Ni`, `d`, `Tr`, `illum`, `Pr`, `Pm`, and the
-//! maps `map_Kd`, `map_Ke`, `map_d`, `map_Pr`, `map_Pm`, `map_Bump` (or `bump`) and `norm` with their options -s, -o, -clamp and -bm;
-//! keywords in any case. What the model cannot use is passed over and counted: ambient colours, spectral files, other
+//! maps `map_Kd`, `map_Ke`, `map_d`, `map_Pr`, `map_Pm`, `map_Bump` (or `bump`) and `norm` (or `map_norm`) with their options -s, -o,
+//! -clamp and -bm; keywords in any case. What the model cannot use is passed over and counted: ambient colours, spectral files, other
 //! maps.
 //!
-//! What a material becomes ([`Entry::material`]): with Pr or Pm or a map of them the metallic-roughness model; with illum 6 or 7 solid
-//! glass of index Ni; with illum 3, 5 or 8 matte with a mirror of Ks; with a Ks above 0, unless illum is 0 or 1, a coat
+//! What a material becomes ([`Entry::material`]): with Pr or Pm or a map of them the metallic-roughness model; with illum 6 or 7 and
+//! no map_d solid glass of index Ni; with illum 3, 5 or 8 matte with a mirror of Ks; with a Ks above 0, unless illum is 0 or 1, a coat
 //! on a diffuse base; else matte. Ns becomes the roughness with the same width of highlight: alpha^2 = 2 / (Ns + 2)
 //! (B. Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007, section 5.1).
 
