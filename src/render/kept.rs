@@ -5,7 +5,7 @@
 //! killed process has left half written ends the file there.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -74,7 +74,8 @@ impl Keeper {
         let io = |e| Error::io(&self.path, e);
         let mut file =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&self.path).map_err(io)?;
-        if file.try_lock().is_err() {
+        // Where files cannot be locked nobody is kept out.
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
             return Err(Error::Usage(format!("{}: another render is writing it", self.path.display())));
         }
         let length = file.metadata().map_err(io)?.len();
