@@ -16,6 +16,9 @@ use crate::scene::text::shown;
 /// How far from a rotation a matrix may be: scripts have ten digits, old ones six.
 const ROTATION_ERROR: f64 = 1e-3;
 
+/// Letters of `rt`'s options that take a value, in the same word or the next (its manual page; `-I` and `-v` take none).
+const WITH_VALUE: &str = "abcdefgjklmnopsuwxzACDEFGHJKNOPQTUVX,@+!";
+
 /// Where to look from, the way BRL-CAD says it. Millimetres, model space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
@@ -115,9 +118,23 @@ fn shell_part(mut lines: Lines<'_>, draft: &mut Draft) -> Result<usize> {
             draft.take_words(&words);
             return Ok(lines.position());
         }
-        words.extend(text.trim_end_matches('\\').split_whitespace().map(|w| w.trim_matches(['\'', '"']).to_owned()));
+        words.extend(shell_words(text.trim_end_matches('\\')));
     }
     Err(lines.error(last, "expected `<<EOF` and commands after it"))
+}
+
+/// The words of a line of a shell script; blanks inside of quotes are parts of a word.
+fn shell_words(line: &str) -> Vec<String> {
+    let mut quote = None;
+    let words = line.split(|c: char| {
+        match quote {
+            Some(open) if open == c => quote = None,
+            None if c == '\'' || c == '"' => quote = Some(c),
+            _ => {}
+        }
+        quote.is_none() && c.is_whitespace()
+    });
+    words.filter(|word| !word.is_empty()).map(|word| word.replace(['\'', '"'], "")).collect()
 }
 
 /// Where the commands end: at a line `EOF`, or at the end of the file.
@@ -127,21 +144,26 @@ fn end_of_script(bytes: &[u8], start: usize) -> usize {
 }
 
 impl Draft {
-    /// Words of the call of `rt`: `-p60`, `-p 60`, the database, the objects.
+    /// Words of the call of `rt`: options (`-p60`, `-p 60`, `-Mp60`), the database, the objects.
     fn take_words(&mut self, words: &[String]) {
-        let mut words = words.iter().skip_while(|word| *word != "rt").skip(1).peekable();
+        let mut words = words.iter().skip_while(|word| *word != "rt").skip(1).map(String::as_str);
         let mut has_database = false;
         while let Some(word) = words.next() {
-            if let Some(angle) = word.strip_prefix("-p") {
-                let text = if angle.is_empty() { words.next().map_or("", String::as_str) } else { angle };
-                self.perspective = text.parse().ok().filter(|&p: &f64| p > 0.0 && p < 180.0).map(f64::to_radians);
-            } else if word.starts_with(['2', '>', '<', '$']) {
+            if let Some(letters) = word.strip_prefix('-') {
+                let Some(at) = letters.find(|letter: char| WITH_VALUE.contains(letter)) else { continue };
+                let (option, value) = letters[at..].split_at(1);
+                let value = if value.is_empty() { words.next().unwrap_or_default() } else { value };
+                if option == "p" {
+                    let angle = value.parse().ok().filter(|&p: &f64| p > 0.0 && p < 180.0);
+                    self.perspective = angle.map(f64::to_radians);
+                }
+            } else if word.starts_with("2>") || word.starts_with(['>', '<', '$']) {
                 if word.ends_with('>') {
                     words.next();
                 }
-            } else if !word.starts_with('-') {
+            } else {
                 if has_database {
-                    self.tops.push(word.clone());
+                    self.tops.push(word.into());
                 }
                 has_database = true;
             }
@@ -253,15 +275,33 @@ mod tests {
         assert_eq!((view.perspective, view.tops.len()), (None, 0));
     }
 
+    /// A script as `saveview` writes it, with the options `options` and what follows them.
+    fn saved(options: &str) -> View {
+        read(&format!("#!/bin/sh\nrt -M {options} 2>> v.log\\\n <<EOF\n{PLAIN}\n\nEOF\nconvert\n")).unwrap()
+    }
+
     #[test]
     fn mged_scripts_name_options_database_and_objects() {
-        let text = format!(
-            "#!/bin/sh\nrt -M -p60 \\\n $*\\\n 'moss.g'\\\n 'all.g' 'b' \\\n 2>> v.log\\\n <<EOF\n{PLAIN}\n\nEOF\nconvert\n"
-        );
-        let view = read(&text).unwrap();
+        let view = saved("-p60 \\\n $*\\\n 'moss.g'\\\n 'all.g' 'b' \\\n");
         assert_eq!(view.tops, ["all.g", "b"]);
         assert_eq!(view.perspective, Some(60f64.to_radians()));
         assert_eq!(view.size, 150.0);
+    }
+
+    /// What follows an option is neither the database nor an object, wherever it stands.
+    #[test]
+    fn values_of_options_are_no_names() {
+        let names = "\\\n $*\\\n '2moss.g'\\\n 'tor.r' '2light.r' \\\n";
+        for (options, angle) in [
+            ("\\\n -o tor.rt.pix", None),
+            ("\\\n -otor.rt.pix -w 512 -n512 -V 1.5", None),
+            ("-o tor.pix -p 35 -J 0 -A 0.9 -C255/0/0 -B -r", Some(35.0)),
+            ("-BP 2 -Wp60 -c 'set ambSamples=8'", Some(60.0)),
+        ] {
+            let view = saved(&format!("{options}{names}"));
+            assert_eq!(view.tops, ["tor.r", "2light.r"], "{options}");
+            assert_eq!(view.perspective, angle.map(f64::to_radians), "{options}");
+        }
     }
 
     /// The same view in three notations: azimuth 35 and elevation 25 degrees.
