@@ -207,6 +207,40 @@ fn what_is_joined_is_said_and_can_be_left_apart() {
     assert_eq!(run(&dir, "verify two.gltf --rays 300 --json").json()["pass"], true);
 }
 
+/// Two spheres of radius 10 in regions of their own, at the origin and at x = 30.
+const TWO_SPHERES: &str = "title {t}\nunits mm\n\
+    put {a.s} sph V {0 0 0} A {10 0 0} B {0 10 0} C {0 0 10}\nput {b.s} sph V {30 0 0} A {10 0 0} B {0 10 0} C {0 0 10}\n\
+    put {a.r} comb region yes tree {l a.s}\nput {b.r} comb region yes tree {l b.s}\n\
+    put {all.g} comb region no tree {u {l a.r} {l b.r}}\n";
+
+/// Both from above, 100 units wide; MGED's script names the second only.
+const SECOND_SPHERE: &str = "#!/bin/sh\nrt -M \\\n -o one.rt.pix\\\n $*\\\n 'two.g'\\\n 'b.r' \\\n 2>> one.rt.log\\\n <<EOF\n\
+    viewsize 100;\neye_pt 15.3 0.2 100;\nviewrot 1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1;\nstart 0;\nend;\n\nEOF\n";
+
+#[test]
+fn every_command_shows_the_objects_of_a_view_script() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    for (name, text) in [("two.asc", TWO_SPHERES), ("one.rt", SECOND_SPHERE), ("script", "click 34 49\nclick 65 49\n")]
+    {
+        std::fs::write(dir.path().join(name), text).expect("a file");
+    }
+    // A pixel's lower left corner is (px - 34.7, 49.2 - py).
+    let pixels = (0..100 * 100).map(|i| (f64::from(i % 100) - 64.7, 49.2 - f64::from(i / 100)));
+    let seen = pixels.filter(|(x, y)| x.hypot(*y) < 10.0).count();
+    let json = |line: &str| run(&dir, &format!("{line} --view one.rt --size 100x100 --json")).json();
+    assert_eq!(json("rays two.asc --kind shadow -o rays.npy")["live"], seen);
+    assert_eq!(json("rays two.asc --top all.g --kind shadow -o rays.npy")["live"], 2 * seen, "--top is stronger");
+    let verified = json("verify two.asc --kinds primary --precision f64");
+    assert!(verified["lines"].as_array().expect("lines").iter().all(|line| line["hits"] == seen), "{verified}");
+    let row = &json("bench two.asc --rays primary --engines scalar --repeat 1")["rows"][0];
+    assert_eq!((&row["scene"]["prims"], &row["outcome"]["timed"]["hits"]), (&1.into(), &seen.into()));
+    assert_eq!(json("explain two.asc --engine scalar")["tree"]["prims"], 1);
+    assert_eq!(json("render two.asc -o two.exr")["holds"]["primitives"], 1);
+    let said = run(&dir, "view two.asc --view one.rt --size 100x100 --headless-script script").out;
+    let said: Vec<serde_json::Value> = said.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    assert!(said[0]["hit"].is_null() && !said[1]["hit"].is_null(), "{said:?}");
+}
+
 /// Ctrl-C in the middle of a bench: exit code 130, and the output is whole.
 #[cfg(unix)]
 #[test]

@@ -207,7 +207,7 @@ fn measure(args: &BenchArgs, workers: &Workers, rows: &mut Vec<Row>) -> Result<(
     let scenes = scenes(args);
     let bar = args.output.progress_bar((scenes.len() * args.rays.len()) as u64, "measuring");
     for scene in &scenes {
-        let description = args.options.load(scene)?;
+        let description = args.options.seen_by(scene, &args.camera)?.load(scene)?;
         let result = match args.options.precision(&description) {
             Precision::F32 => one::<f32>(args, workers, &description, &bar, rows),
             Precision::F64 => one::<f64>(args, workers, &description, &bar, rows),

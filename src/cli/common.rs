@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::measure::timing::MAX_THREADS;
 use crate::scene::brlcad::describe::Options;
 use crate::scene::description::{Description, Precision};
-use crate::scene::load::{LoadOptions, ReadMesh, load_with, read_mesh};
+use crate::scene::load::{LoadOptions, ReadMesh, is_database, load_with, read_mesh};
 use crate::scene::world::{BuildSettings, Preset};
 use crate::trace::{EXACT_ENGINE, Engine, Engines, engine as engine_called};
 
@@ -119,9 +119,30 @@ impl SceneArgs {
     pub fn load(&self) -> Result<Description> {
         self.options.load(&self.scene)
     }
+
+    /// What `camera` is to see of it; see [`SceneOptions::seen_by`].
+    ///
+    /// # Errors
+    /// A view script that cannot be read.
+    pub fn seen_by(&self, camera: &CameraArgs) -> Result<Self> {
+        Ok(Self { scene: self.scene.clone(), options: self.options.seen_by(&self.scene, camera)? })
+    }
 }
 
 impl SceneOptions {
+    /// The same for `scene` as `camera` looks at it: of a database the objects that the view script names, unless `--top`
+    /// names some.
+    ///
+    /// # Errors
+    /// A view script that cannot be read.
+    pub fn seen_by(&self, scene: &str, camera: &CameraArgs) -> Result<Self> {
+        let mut options = self.clone();
+        if options.top.is_empty() && is_database(scene) {
+            options.top = camera.script()?.map(|view| view.tops).unwrap_or_default();
+        }
+        Ok(options)
+    }
+
     /// Opens `scene` with these options.
     ///
     /// # Errors

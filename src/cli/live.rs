@@ -81,7 +81,7 @@ pub fn run(args: &ViewArgs) -> Result<()> {
     let threads = args.threads.count();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Usage(format!("cannot start {threads} threads: {e}")))?;
-    let source = source(&args.scene)?;
+    let source = source(&args.scene.seen_by(&args.camera)?)?;
     let stage = pool.install(|| first(&source))?;
     for warning in &stage.description().warnings {
         args.output.say(&format!("warning: {warning}"));

@@ -20,7 +20,6 @@ use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
 use crate::render::{Aov, Keeper, Progress, RenderOptions};
 use crate::scene::description::{Description, Precision};
-use crate::scene::load::{ReadMesh, read_mesh};
 use crate::scene::world::World;
 use crate::shade::{Integrator, Shades, unaimed, unknown_shaders};
 
@@ -203,7 +202,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         return frames::run(args, frames);
     }
     let options = options(args)?;
-    let description = load(args)?;
+    let description = args.scene.seen_by(&args.camera)?.load()?;
     for warning in &description.warnings {
         args.output.say(&format!("warning: {warning}"));
     }
@@ -220,20 +219,6 @@ fn compiled<S: Shades>(args: &RenderArgs, description: &Description, options: &R
     args.engine.find::<S>()?;
     let world = World::<S>::compile(description, args.scene.options.build())?;
     picture(args, description, options, &world, true)
-}
-
-/// The scene; of a database the objects that the view script names, unless `--top` names some.
-fn load(args: &RenderArgs) -> Result<Description> {
-    load_with(args, &read_mesh)
-}
-
-/// The same with meshes read by `read`.
-fn load_with(args: &RenderArgs, read: &ReadMesh<'_>) -> Result<Description> {
-    let mut scene = args.scene.clone();
-    if scene.options.top.is_empty() && !scene.scene.starts_with("builtin:") {
-        scene.options.top = args.camera.script()?.map(|view| view.tops).unwrap_or_default();
-    }
-    scene.options.load_with(&scene.scene, read)
 }
 
 /// Whether `rt`'s lighting model knows all that the scene asks of it.

@@ -149,6 +149,12 @@ pub fn read_mesh(path: &Path, references: &References<'_>) -> Result<MeshFile> {
     Ok(MeshFile { mesh, digest, looks })
 }
 
+/// Whether `scene` is a BRL-CAD database, by its name.
+pub fn is_database(scene: &str) -> bool {
+    let inner = unpack::inner_extension(Path::new(scene)).unwrap_or_default();
+    !scene.starts_with("builtin:") && ["asc", "g"].contains(&inner.as_str())
+}
+
 /// The known extension of `path`, lower case, without the packing's.
 fn extension(path: &Path) -> Result<String> {
     let inner = unpack::inner_extension(path).unwrap_or_default();

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{RenderArgs, check_rt, load_with, options, picture};
-use crate::cli::common::with_pool;
+use super::{RenderArgs, check_rt, options, picture};
+use crate::cli::common::{SceneArgs, with_pool};
 use crate::error::{Error, Result};
 use crate::scene::description::{Description, Precision};
 use crate::scene::kdl::FRAME;
@@ -44,11 +44,13 @@ fn numbered(path: &Path, frame: u32) -> PathBuf {
 pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     let options = options(args)?;
     let meshes = Meshes::default();
+    let scene = args.scene.seen_by(&args.camera)?;
     let describe = |frame: u32| {
-        let mut of_frame = RenderArgs { frames: None, ..args.clone() };
+        let mut of_frame = RenderArgs { frames: None, scene: scene.clone(), ..args.clone() };
         of_frame.files.iter_mut().for_each(|file| file.path = numbered(&file.path, frame));
         of_frame.scene.options.set.push((FRAME.into(), frame.to_string()));
-        let description = load_with(&of_frame, &|path, references| meshes.read(path, references))?;
+        let SceneArgs { scene, options } = &of_frame.scene;
+        let description = options.load_with(scene, &|path, references| meshes.read(path, references))?;
         Ok::<_, Error>((of_frame, description))
     };
     let is_wanted = |frame: &u32| {
