@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use common::{Scene, crowd, soup, terrain};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use lanecast::measure::answers::Answers;
-use lanecast::measure::eye::View;
+use lanecast::measure::eye::{Eye, View};
 use lanecast::measure::raysets::{Query, RayKind, convert};
 use lanecast::measure::truth;
 use lanecast::ray::Rays;
@@ -62,7 +62,8 @@ fn truth<S: Engines>(what: &str, world: &World<S>, batches: &[Rays<S>], query: Q
 
 fn scene<S: Engines>(criterion: &mut Criterion, scene: &Scene) {
     let world = World::<S>::compile(&scene.description, Preset::Balanced).expect("the scene compiles");
-    let view = View::new(&world, &scene.description, &|_| Ok(scene.camera.clone()), (SIZE, SIZE), 1).expect("a view");
+    let camera = |_, size| Eye::new(&scene.camera, size);
+    let view = View::new(&world, &scene.description, &camera, (SIZE, SIZE), 1).expect("a view");
     let (mut scratch, oracle) = (Scratch::default(), Oracle::new(&world.assembly));
     // Further bounces hit too little in open scenes.
     // Here rays are packed before the clock starts: the camera's own would be the primary ones again.

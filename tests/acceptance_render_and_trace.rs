@@ -9,6 +9,9 @@ use lanecast::film::exr;
 
 const SIZE: (usize, usize) = (150, 70);
 
+/// From above at an angle, towards the built-in gallery: a parallel view, sampled at the lower left corners of pixels.
+const VIEW: &str = "viewsize 14; eye_pt 10 8 20; lookat_pt 0 1.5 -2; start 0; end;";
+
 fn run(folder: &Path, arguments: &[&str]) {
     let ended = lanecast(folder, arguments);
     assert_eq!(ended.code, Some(0), "{arguments:?}: {}{}", ended.out, ended.err);
@@ -31,12 +34,14 @@ fn hits(path: &Path) -> Vec<(f32, u32, u32)> {
 }
 
 /// `Z` is the distance from the eye: t times the length of the ray's direction.
-fn same_picture(scene: &str) {
+fn same_picture(scene: &str, camera: &str) {
     let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("view.rt"), VIEW).expect("a view script");
     let size = format!("{}x{}", SIZE.0, SIZE.1);
-    run(dir.path(), &["render", scene, "-o", "seen.exr", "--size", &size, "--aov", "Z,id.primitive,id.instance"]);
-    run(dir.path(), &["rays", scene, "--kind", "primary", "--size", &size, "-o", "rays.npy"]);
-    run(dir.path(), &["trace", scene, "--rays", "rays.npy", "--hits", "hits.npy", "--repeat", "1"]);
+    let run = |line: String| run(dir.path(), &line.split_whitespace().collect::<Vec<_>>());
+    run(format!("render {scene} -o seen.exr --size {size} --aov Z,id.primitive,id.instance {camera}"));
+    run(format!("rays {scene} --kind primary --size {size} -o rays.npy {camera}"));
+    run(format!("trace {scene} --rays rays.npy --hits hits.npy --repeat 1"));
     let film = exr::read(&dir.path().join("seen.exr")).expect("an EXR file");
     let (prims, insts) = (film.u32_plane("id.primitive").expect("ids"), film.u32_plane("id.instance").expect("ids"));
     let depth = film.f32_plane("Z").expect("Z");
@@ -77,16 +82,24 @@ fn length(dir: [f32; 3]) -> f32 {
 
 #[test]
 fn gallery() {
-    same_picture("builtin:gallery");
+    same_picture("builtin:gallery", "");
 }
 
 #[test]
 fn forest() {
-    same_picture("builtin:forest");
+    same_picture("builtin:forest", "");
+}
+
+/// What BRL-CAD's `rt` would see; every command samples pixels where it does.
+#[test]
+fn views_of_rt() {
+    for camera in ["--az 35", "--az 200 --el 40", "--view view.rt"] {
+        same_picture("builtin:gallery", camera);
+    }
 }
 
 #[test]
 fn sponza() {
     let Some(path) = shared("scenes/sponza_crytek/sponza_crytek.ply") else { return };
-    same_picture(path.to_str().expect("UTF-8"));
+    same_picture(path.to_str().expect("UTF-8"), "");
 }

@@ -6,7 +6,7 @@ mod binary;
 use binary::shared;
 use lanecast::camera::framing;
 use lanecast::measure::answers::Answers;
-use lanecast::measure::eye::View;
+use lanecast::measure::eye::{Eye, View};
 use lanecast::measure::raysets::{Query, RayKind};
 use lanecast::measure::timing::Workers;
 use lanecast::ray::Rays;
@@ -43,7 +43,8 @@ fn same_bits<S: Engines>(scene: &str, size: (u32, u32)) {
     let description = load(scene, &LoadOptions::default()).expect("a scene");
     let world = World::<S>::compile(&description, Preset::Fast).expect("a world");
     let aspect = f64::from(size.0) / f64::from(size.1);
-    let camera = |bounds| Ok(description.cameras.first().cloned().unwrap_or_else(|| framing(bounds, aspect)));
+    let first = |bounds| description.cameras.first().cloned().unwrap_or_else(|| framing(bounds, aspect));
+    let camera = |bounds, size| Eye::new(&first(bounds), size);
     let view = View::new(&world, &description, &camera, size, 1).expect("a view");
     let workers = [1, 2].map(|threads| Workers::new(threads).expect("threads"));
     for kind in [RayKind::Primary, RayKind::Diffuse, RayKind::Scatter] {

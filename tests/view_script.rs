@@ -52,6 +52,17 @@ fn the_view_is_the_rendered_picture() {
     }
 }
 
+/// Views of BRL-CAD's `rt` too, which sample pixels at a corner, and again after a way out and home.
+#[test]
+fn a_view_of_rt_is_the_rendered_picture() {
+    let dir = folder("wait\nsave seen.exr\norbit 10 0\nreset\nwait\nsave again.exr\n");
+    view(dir.path(), "builtin:gallery --size 65x40 --az 35");
+    let want = render(dir.path(), "builtin:gallery --size 65x40 --az 35");
+    for name in ["seen.exr", "again.exr"] {
+        assert!(exr::read(&dir.path().join(name)).unwrap() == want, "{name}");
+    }
+}
+
 /// Moving by script is looking from there.
 #[test]
 fn moves_lead_where_they_say() {

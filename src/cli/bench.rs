@@ -259,7 +259,7 @@ fn one<S: Engines>(
         build: args.options.build(),
         peers: args.invitation(),
     };
-    let camera = |bounds| args.camera.choose(description, bounds, size);
+    let camera = |bounds, size| args.camera.ready(description, bounds, size);
     let mut class = "";
     let mut report = |row: Row| {
         if class != row.class {

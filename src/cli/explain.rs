@@ -104,7 +104,7 @@ fn explain<S: Engines>(args: &ExplainArgs, description: &Description) -> Result<
     let size = args.camera.size.unwrap_or(DEFAULT_SIZE);
     let workers = Workers::new(args.threads.count())?;
     let world = workers.install(|| World::<S>::compile(description, args.scene.options.build()))?;
-    let camera = |bounds| args.camera.choose(description, bounds, size);
+    let camera = |bounds, size| args.camera.ready(description, bounds, size);
     let view = workers.install(|| View::new(&world, description, &camera, size, args.seed))?;
     let bar = args.output.progress_bar((args.rays.len() * engines.len()) as u64, "counting");
     let mut report = Report {

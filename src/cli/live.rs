@@ -146,7 +146,10 @@ fn first(source: &Source) -> Result<Arc<dyn Stage>> {
 /// The view that the arguments ask for.
 fn view(args: &ViewArgs, stage: &dyn Stage) -> Result<View> {
     let (width, height) = args.camera.size.unwrap_or(DEFAULT_SIZE);
-    let camera = args.camera.choose(stage.description(), stage.bounds(), (width, height))?;
+    let (description, bounds, size) = (stage.description(), stage.bounds(), (width, height));
+    let camera = args.camera.choose(description, bounds, size)?;
+    let home = camera.clone();
+    let rt = args.camera.rt_view(description, bounds)?.map(|view| (camera.clone(), view));
     let engine = match args.engine.engine.as_str() {
         "auto" => EXACT_ENGINE.to_string(),
         name => name.to_string(),
@@ -154,8 +157,8 @@ fn view(args: &ViewArgs, stage: &dyn Stage) -> Result<View> {
     let spp = args.spp;
     let options = RenderOptions { width, height, spp, integrator: args.integrator, engine, ..Default::default() };
     options.check()?;
-    let home = camera.clone();
-    Ok(View { look: Look { camera, options, start: LARGEST_BLOCK, heat: None }, home, exposure: args.exposure })
+    let look = Look { camera, rt, options, start: LARGEST_BLOCK, heat: None };
+    Ok(View { look, home, exposure: args.exposure })
 }
 
 fn save(args: &ViewArgs, path: &Path, film: &Film, view: &View) -> Result<()> {

@@ -97,7 +97,7 @@ pub fn run(args: &RaysArgs) -> Result<()> {
 
 fn rays<S: Engines>(args: &RaysArgs, description: &Description, size: (u32, u32)) -> Result<Vec<Rays<f32>>> {
     let world = World::<S>::compile(description, args.scene.options.build())?;
-    let camera = |bounds| args.camera.choose(description, bounds, size);
+    let camera = |bounds, size| args.camera.ready(description, bounds, size);
     let view = View::new(&world, description, &camera, size, args.seed)?;
     view.rays(&world, args.kind)
 }

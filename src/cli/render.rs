@@ -302,7 +302,7 @@ fn picture<S: Shades>(
     let engine = args.engine.for_blocks(args.preview.by_blocks()).find::<S>()?;
     let (width, height) = (options.width, options.height);
     let camera_args = if args.rt_compat { args.camera.or_default_view() } else { args.camera.clone() };
-    let camera = camera_args.ready(description, world.bounds(), (width, height))?;
+    let camera = camera_args.ready(description, world.bounds(), (width, height))?.camera;
     if options.integrator == Integrator::Path {
         warn_of_unaimed(args, unaimed(world, description));
     }

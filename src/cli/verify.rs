@@ -101,8 +101,7 @@ fn one<S: Engines>(
         seed: args.seed,
         build: args.scene.options.build(),
     };
-    let size = args.camera.size.unwrap_or((4, 3));
-    let camera = |bounds| args.camera.choose(description, bounds, size);
+    let camera = |bounds, size| args.camera.ready(description, bounds, size);
     let bar = args.output.progress_bar((2 * args.kinds.len() * S::engines().len()) as u64, "verifying");
     let mut report = |line: Line| {
         bar.inc(1);

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::camera::{Camera, CameraOverrides, framing};
 use crate::error::{Error, Result, nearest_name};
+use crate::measure::eye::Eye;
 use crate::scene::brlcad::describe::DEFAULT_VIEW;
 use crate::scene::brlcad::view::{self, View};
 use crate::scene::description::{CameraDescription, Description};
@@ -61,7 +62,7 @@ impl CameraArgs {
         size: (u32, u32),
     ) -> Result<CameraDescription> {
         let aspect = f64::from(size.0) / f64::from(size.1);
-        if let Some(view) = self.brlcad_view(description, bounds)? {
+        if let Some(view) = self.rt_view(description, bounds)? {
             return Ok(view.camera("view", aspect));
         }
         let camera = match (&self.camera, description.cameras.first()) {
@@ -77,11 +78,13 @@ impl CameraArgs {
     ///
     /// # Errors
     /// Those of [`Self::choose`] and [`Camera::new`].
-    pub fn ready(&self, description: &Description, bounds: Option<(DVec3, DVec3)>, size: (u32, u32)) -> Result<Camera> {
-        let aspect = f64::from(size.0) / f64::from(size.1);
-        match self.brlcad_view(description, bounds)? {
-            Some(view) => Camera::of_view(&view, aspect),
-            None => Camera::new(&self.choose(description, bounds, size)?, aspect),
+    pub fn ready(&self, description: &Description, bounds: Option<(DVec3, DVec3)>, size: (u32, u32)) -> Result<Eye> {
+        match self.rt_view(description, bounds)? {
+            Some(view) => {
+                let camera = Camera::of_view(&view, f64::from(size.0) / f64::from(size.1))?;
+                Ok(Eye { camera, up: camera.v })
+            }
+            None => Eye::new(&self.choose(description, bounds, size)?, size),
         }
     }
 
@@ -105,7 +108,11 @@ impl CameraArgs {
         view::parse(path, &bytes).map(Some)
     }
 
-    fn brlcad_view(&self, description: &Description, bounds: Option<(DVec3, DVec3)>) -> Result<Option<View>> {
+    /// The view of BRL-CAD's `rt` that is asked for, if one is.
+    ///
+    /// # Errors
+    /// Those of [`Self::script`].
+    pub fn rt_view(&self, description: &Description, bounds: Option<(DVec3, DVec3)>) -> Result<Option<View>> {
         if self.az.is_none() && self.el.is_none() {
             return self.script();
         }
@@ -202,7 +209,7 @@ mod tests {
     fn angles_frame_the_scene_as_rt_does() {
         let bounds = Some((DVec3::splat(-2.0), DVec3::splat(2.0)));
         let args = CameraArgs { az: Some(35.0), ..Default::default() };
-        let camera = args.ready(&Description::new("s"), bounds, (512, 512)).unwrap();
+        let camera = args.ready(&Description::new("s"), bounds, (512, 512)).unwrap().camera;
         // What rt itself reports for a box of 4 x 4 x 4 about the origin.
         assert!((camera.eye - DVec3::new(3.63702136, 2.54666977, 2.07039819)).length() < 1e-8, "{}", camera.eye);
         assert!((2.0 * camera.half_width - 6.928203230275509).abs() < 1e-12);

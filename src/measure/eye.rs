@@ -13,8 +13,29 @@ use crate::scene::description::{CameraDescription, Description};
 use crate::scene::world::World;
 use crate::trace::{Engine, Engines, Scratch, engine};
 
-/// Picks the camera once the bounds of the scene (lower and upper corner, `None` if nothing is bounded) are known.
-pub type Framing<'a> = &'a (dyn Fn(Option<(DVec3, DVec3)>) -> Result<CameraDescription> + Sync);
+/// Picks the camera once the bounds of the scene (lower and upper corner, `None` if nothing is bounded) and the width and
+/// height of the picture are known.
+pub type Framing<'a> = &'a (dyn Fn(Option<(DVec3, DVec3)>, (u32, u32)) -> Result<Eye> + Sync);
+
+/// A camera ready to make rays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eye {
+    /// What makes them.
+    pub camera: Camera,
+    /// What its owner calls up, of any length: the default light is there. The camera's own is at right angles to where it looks.
+    pub up: DVec3,
+}
+
+impl Eye {
+    /// The camera that `camera` means, for pictures of `size` (width, height).
+    ///
+    /// # Errors
+    /// Those of [`Camera::new`].
+    pub fn new(camera: &CameraDescription, size: (u32, u32)) -> Result<Self> {
+        let aspect = f64::from(size.0) / f64::from(size.1);
+        Ok(Self { camera: Camera::new(camera, aspect)?, up: camera.up })
+    }
+}
 
 /// A scene seen by a camera: primary rays, where they hit, and what secondary rays need to know.
 pub struct View {
@@ -35,7 +56,7 @@ impl View {
     /// primary rays are traced by the `scalar` engine on the current rayon pool.
     ///
     /// # Errors
-    /// Those of `camera`, and a camera that cannot see (eye and target coincide, no field of view).
+    /// Those of `camera`; sizes that no picture has.
     pub fn new<S: Engines>(
         world: &World<S>,
         description: &Description,
@@ -44,21 +65,19 @@ impl View {
         seed: u64,
     ) -> Result<Self> {
         let bounds = world.bounds();
-        let camera = camera(bounds)?;
-        let (width, height) = size;
-        let tiling = Tiling::new(width, height, FILE_TILE)?;
-        let eye = Camera::new(&camera, f64::from(width) / f64::from(height))?;
-        let primary = primary_rays(&eye, &tiling);
+        let Eye { camera, up } = camera(bounds, size)?;
+        let tiling = Tiling::new(size.0, size.1, FILE_TILE)?;
+        let primary = primary_rays(&camera, &tiling);
         let scalar = engine::<S>("scalar")?;
         let starts = Starts::trace(world, scalar, &primary);
         // A scene of nothing but half-spaces has no diagonal; its lengths are then taken as unit length.
         let diagonal = bounds.map_or(1.0, |(lo, hi)| (hi - lo).length());
-        let up = camera.up.normalize_or_zero();
+        let up = up.normalize_or_zero();
         let clearance = clearance(world, scalar, camera.eye, up);
         let light = light_for(&description.lights, camera.eye, up, diagonal, clearance);
         let pixels = u64::from(size.0) * u64::from(size.1);
         let setting = Setting { light, diagonal, seed };
-        Ok(Self { primary, starts, setting, pixels, camera: eye, tiling })
+        Ok(Self { primary, starts, setting, pixels, camera, tiling })
     }
 
     /// Makes the primary rays of tile `tile`, batch `tile` of [`Self::primary`]: of a camera with an eye point only where
@@ -93,7 +112,7 @@ impl View {
     }
 }
 
-/// The rays of `camera` through the pixel centres of the picture, in ray-file order.
+/// The rays of `camera` through the picture's pixels, each where the camera samples it, in ray-file order.
 fn primary_rays<S: Real>(camera: &Camera, tiling: &Tiling) -> Vec<Rays<S>> {
     let tile = |tile| {
         let mut rays = Rays::new(0);

@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::ray::{Counters, Hits, Rays};
 use crate::render::progressive::{Progressive, Viewer};
 use crate::render::{Progress, RenderOptions, RenderOutput};
+use crate::scene::brlcad::view::View;
 use crate::scene::description::{CameraDescription, Description};
 use crate::scene::world::World;
 use crate::shade::Shades;
@@ -20,6 +21,9 @@ use crate::trace::{Scratch, engine};
 pub struct Look {
     /// From where.
     pub camera: CameraDescription,
+    /// A camera that stands for a view of BRL-CAD's `rt`, and that view: until something moves it, pixels are sampled where
+    /// `rt` samples them.
+    pub rt: Option<(CameraDescription, View)>,
     /// Size, integrator, engine, samples.
     pub options: RenderOptions,
     /// Edge of the first blocks, pixels.
@@ -34,7 +38,11 @@ impl Look {
     /// # Errors
     /// Those of [`Camera::new`].
     pub fn camera(&self) -> Result<Camera> {
-        Camera::new(&self.camera, f64::from(self.options.width) / f64::from(self.options.height))
+        let aspect = f64::from(self.options.width) / f64::from(self.options.height);
+        match &self.rt {
+            Some((camera, view)) if self.camera == *camera => Camera::of_view(view, aspect),
+            _ => Camera::new(&self.camera, aspect),
+        }
     }
 }
 

@@ -13,11 +13,12 @@ use crate::measure::bench::{self, Plan};
 use crate::measure::env;
 use crate::measure::experiment::{Case, Experiment, parse};
 use crate::measure::explain::Ports;
+use crate::measure::eye::Eye;
 use crate::measure::peers::Invitation;
 use crate::measure::raysets::RayKind;
 use crate::measure::rows::{Outcome, Row, Run};
 use crate::measure::timing::Workers;
-use crate::scene::description::{CameraDescription, Description, Precision};
+use crate::scene::description::{Description, Precision};
 use crate::scene::load::{LoadOptions, load};
 use crate::scene::world::{BuildSettings, Preset};
 use crate::trace::Engines;
@@ -172,9 +173,9 @@ impl Steps<'_, '_> {
 }
 
 fn one<S: Engines>(workers: &Workers, description: &Description, plan: &Plan, mut rows: Steps<'_, '_>) -> Result<()> {
-    let camera = |bounds| -> Result<CameraDescription> {
-        let aspect = f64::from(plan.size.0) / f64::from(plan.size.1);
-        Ok(description.cameras.first().cloned().unwrap_or_else(|| framing(bounds, aspect)))
+    let camera = |bounds, size: (u32, u32)| {
+        let framed = || framing(bounds, f64::from(size.0) / f64::from(size.1));
+        Eye::new(&description.cameras.first().cloned().unwrap_or_else(framed), size)
     };
     let result = bench::scene::<S>(workers, description, &camera, plan, &stopped, &mut |row| rows.add(row));
     // All rows of a class are reported at once when it is done, so what is pending is whole.

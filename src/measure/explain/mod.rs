@@ -269,8 +269,8 @@ fn maps(counted: &[Vec<Counters>], lanes: usize, (width, height): (u32, u32)) ->
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::eye::View;
-    use crate::scene::description::{CameraDescription, Description, Projection};
+    use crate::measure::eye::{Eye, View};
+    use crate::scene::description::{Description, Projection};
     use crate::scene::load::{LoadOptions, load};
     use crate::scene::world::Preset;
 
@@ -279,7 +279,7 @@ mod tests {
     fn cornell() -> (World<f32>, Vec<Rays<f32>>, Description) {
         let scene = load("builtin:cornell", &LoadOptions::default()).unwrap();
         let world = World::<f32>::compile(&scene, Preset::Fast).unwrap();
-        let framing = |_| -> Result<CameraDescription> { Ok(scene.cameras[0].clone()) };
+        let framing = |_, size| Eye::new(&scene.cameras[0], size);
         let view = View::new(&world, &scene, &framing, (64, 40), 1).unwrap();
         let rays = view.rays(&world, RayKind::Primary).unwrap();
         (world, rays, scene)
