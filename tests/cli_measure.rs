@@ -241,6 +241,35 @@ fn every_command_shows_the_objects_of_a_view_script() {
     assert!(said[0]["hit"].is_null() && !said[1]["hit"].is_null(), "{said:?}");
 }
 
+/// A sphere, and a solid of a kind that is not shown.
+const WITH_ARS: &str = "title {t}\nunits mm\nput {a.s} sph V {0 0 0} A {10 0 0} B {0 10 0} C {0 0 10}\n\
+    put {e.s} ars NC 3 PPC 3 C0 {{0 0 0}} C1 {{1 0 0}} C2 {{2 0 0}}\nput {a.r} comb region yes tree {l a.s}\n\
+    put {e.r} comb region yes tree {l e.s}\nput {all.g} comb region no tree {u {l a.r} {l e.r}}\n";
+
+#[test]
+fn every_command_says_once_what_a_scene_is_shown_without() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("ars.asc"), WITH_ARS).expect("a database");
+    std::fs::write(dir.path().join("script"), "frame 0\n").expect("a script");
+    for line in [
+        "render ars.asc --size 8x8 -o a.exr",
+        "rays ars.asc --size 8x8 --kind primary -o rays.npy",
+        "trace ars.asc --rays rays.npy --repeat 1",
+        "info ars.asc",
+        "explain ars.asc --size 8x8 --engine scalar",
+        "verify ars.asc --rays 50 --kinds primary",
+        "convert ars.asc -o a.stl --cells 8",
+        "bench ars.asc --size 8x8 --rays primary --engines scalar --repeat 1 -o out",
+        "view ars.asc --size 8x8 --headless-script script",
+    ] {
+        let left_out = |more: &str| {
+            let said = run(&dir, &format!("{line} --lenient{more}")).err;
+            said.lines().filter(|line| line.starts_with("warning: left out: `e.s`")).count()
+        };
+        assert_eq!((left_out(""), left_out(" -q")), (1, 0), "{line}");
+    }
+}
+
 /// Ctrl-C in the middle of a bench: exit code 130, and the output is whole.
 #[cfg(unix)]
 #[test]

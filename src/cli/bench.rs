@@ -207,7 +207,7 @@ fn measure(args: &BenchArgs, workers: &Workers, rows: &mut Vec<Row>) -> Result<(
     let scenes = scenes(args);
     let bar = args.output.progress_bar((scenes.len() * args.rays.len()) as u64, "measuring");
     for scene in &scenes {
-        let description = args.options.seen_by(scene, &args.camera)?.load(scene)?;
+        let description = args.options.seen_by(scene, &args.camera)?.load(scene, &args.output)?;
         let result = match args.options.precision(&description) {
             Precision::F32 => one::<f32>(args, workers, &description, &bar, rows),
             Precision::F64 => one::<f64>(args, workers, &description, &bar, rows),
@@ -229,15 +229,17 @@ fn scenes(args: &BenchArgs) -> Vec<String> {
 /// What the rays saw: one EXR per scene, named after it.
 fn pictures(args: &BenchArgs, dir: &Path) -> Result<()> {
     for scene in scenes(args) {
-        let name = args.options.load(&scene)?.name;
+        // What it is shown without was said when it was measured.
+        let quiet = OutputArgs { quiet: true, ..OutputArgs::default() };
+        let description = args.options.seen_by(&scene, &args.camera)?.load(&scene, &quiet)?;
         // A scene may be called anything; a file may not.
-        let stem: String =
-            name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
+        let file_like = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
+        let stem: String = description.name.chars().map(file_like).collect();
         let path = dir.join(format!("{stem}.exr"));
         let scene = SceneArgs { scene, options: args.options.clone() };
         let mut picture = RenderArgs::plain(scene, args.camera.clone(), args.threads, path);
         picture.output.quiet = args.output.quiet;
-        render::run(&picture)?;
+        render::of_scene(&picture, &description)?;
     }
     Ok(())
 }

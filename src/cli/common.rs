@@ -112,12 +112,12 @@ pub enum PrecisionArg {
 }
 
 impl SceneArgs {
-    /// Opens the scene.
+    /// Opens the scene; see [`SceneOptions::load`].
     ///
     /// # Errors
     /// Those of [`load_with`].
-    pub fn load(&self) -> Result<Description> {
-        self.options.load(&self.scene)
+    pub fn load(&self, output: &OutputArgs) -> Result<Description> {
+        self.options.load(&self.scene, output)
     }
 
     /// What `camera` is to see of it; see [`SceneOptions::seen_by`].
@@ -143,15 +143,17 @@ impl SceneOptions {
         Ok(options)
     }
 
-    /// Opens `scene` with these options.
+    /// Opens `scene` with these options and says what it is shown without.
     ///
     /// # Errors
     /// Those of [`load_with`].
-    pub fn load(&self, scene: &str) -> Result<Description> {
-        self.load_with(scene, &read_mesh)
+    pub fn load(&self, scene: &str, output: &OutputArgs) -> Result<Description> {
+        let description = self.load_with(scene, &read_mesh)?;
+        output.warn(&description.warnings);
+        Ok(description)
     }
 
-    /// The same with meshes read by `read`.
+    /// Opens it with meshes read by `read`; what it is shown without is left to the caller to say.
     ///
     /// # Errors
     /// Those of [`load_with`].

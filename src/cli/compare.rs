@@ -175,7 +175,7 @@ fn hits(args: &CompareArgs, a: &FileAnswers, b: &FileAnswers) -> Result<()> {
     }
     let mut report = hitfiles::compare(a, b)?;
     if let (Some(scene), Some(rays)) = (&args.scene, &args.rays) {
-        let description = args.options.load(scene)?;
+        let description = args.options.load(scene, &args.output)?;
         hitfiles::judge(&mut report, [a, b], &npy::read_rays(rays)?, &description)?;
     }
     let failures = args.limits.of_hits(&report)?;

@@ -118,7 +118,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     if is_npy && args.cells.is_some() {
         return Err(Error::Usage("--cells is for meshes; voxels want --voxels or --tolerance".into()));
     }
-    let description = args.scene.load()?;
+    let description = args.scene.load(&args.output)?;
     with_pool(args.threads.count(), || {
         let solids = Solids::new(&description, &args.solid)?;
         if solids.left_out > 0 {

@@ -91,7 +91,7 @@ struct Class {
 /// # Errors
 /// Bad input; [`Error::Interrupted`].
 pub fn run(args: &ExplainArgs) -> Result<()> {
-    let description = args.scene.seen_by(&args.camera)?.load()?;
+    let description = args.scene.seen_by(&args.camera)?.load(&args.output)?;
     match args.scene.options.precision(&description) {
         Precision::F32 => explain::<f32>(args, &description),
         Precision::F64 => explain::<f64>(args, &description),

@@ -90,7 +90,7 @@ struct Tree {
 /// # Errors
 /// Bad input.
 pub fn run(args: &InfoArgs) -> Result<()> {
-    let description = args.scene.load()?;
+    let description = args.scene.load(&args.output)?;
     with_pool(args.threads.count(), || match args.scene.options.precision(&description) {
         Precision::F32 => info::<f32>(args, &description),
         Precision::F64 => info::<f64>(args, &description),
@@ -103,11 +103,7 @@ fn info<S: Engines>(args: &InfoArgs, description: &Description) -> Result<()> {
     if args.output.json {
         return json_to_stdout(&report);
     }
-    to_stdout(&text(&report))?;
-    for warning in &description.warnings {
-        args.output.say(&format!("warning: {warning}"));
-    }
-    Ok(())
+    to_stdout(&text(&report))
 }
 
 fn report<'a, S: Engines>(scene: &'a str, description: &'a Description, world: &World<S>) -> Report<'a> {

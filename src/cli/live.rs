@@ -83,9 +83,7 @@ pub fn run(args: &ViewArgs) -> Result<()> {
     let pool = pool.map_err(|e| Error::Usage(format!("cannot start {threads} threads: {e}")))?;
     let source = source(&args.scene.seen_by(&args.camera)?)?;
     let stage = pool.install(|| first(&source))?;
-    for warning in &stage.description().warnings {
-        args.output.say(&format!("warning: {warning}"));
-    }
+    args.output.warn(&stage.description().warnings);
     let view = view(args, &*stage)?;
     let save = |path: &Path, film: &Film, view: &View| save(args, path, film, view);
     let name = stage.description().name.clone();

@@ -29,6 +29,11 @@ impl OutputArgs {
         }
     }
 
+    /// What a scene is shown without, or otherwise than it says, a line each.
+    pub fn warn<'a>(&self, warnings: impl IntoIterator<Item = &'a String>) {
+        warnings.into_iter().for_each(|warning| self.say(&format!("warning: {warning}")));
+    }
+
     /// A line on stderr with `-v`.
     pub fn detail(&self, line: &str) {
         if self.verbose > 0 {

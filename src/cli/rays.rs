@@ -68,7 +68,7 @@ struct Report<'a> {
 /// # Errors
 /// Bad input, an output that cannot be written, [`Error::Interrupted`].
 pub fn run(args: &RaysArgs) -> Result<()> {
-    let description = args.scene.seen_by(&args.camera)?.load()?;
+    let description = args.scene.seen_by(&args.camera)?.load(&args.output)?;
     let size = args.camera.size.unwrap_or(DEFAULT_SIZE);
     let rays = with_pool(args.threads.count(), || match args.scene.options.precision(&description) {
         Precision::F32 => rays::<f32>(args, &description, size),

@@ -202,16 +202,24 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         return frames::run(args, frames);
     }
     let options = options(args)?;
-    let description = args.scene.seen_by(&args.camera)?.load()?;
-    for warning in &description.warnings {
-        args.output.say(&format!("warning: {warning}"));
-    }
+    still(args, &args.scene.seen_by(&args.camera)?.load(&args.output)?, &options)
+}
+
+/// The picture of a scene that is open.
+///
+/// # Errors
+/// As [`run`].
+pub(super) fn of_scene(args: &RenderArgs, description: &Description) -> Result<()> {
+    still(args, description, &options(args)?)
+}
+
+fn still(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
     if options.integrator == Integrator::Rt {
-        check_rt(args, &description)?;
+        check_rt(args, description)?;
     }
-    with_pool(args.threads.count(), || match args.scene.options.precision(&description) {
-        Precision::F32 => compiled::<f32>(args, &description, &options),
-        Precision::F64 => compiled::<f64>(args, &description, &options),
+    with_pool(args.threads.count(), || match args.scene.options.precision(description) {
+        Precision::F32 => compiled::<f32>(args, description, options),
+        Precision::F64 => compiled::<f64>(args, description, options),
     })
 }
 

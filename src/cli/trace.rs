@@ -159,7 +159,7 @@ struct Bytes {
 /// # Errors
 /// Bad input; [`Error::Mismatch`] if the engine's hits are not the `scalar` engine's; [`Error::Interrupted`].
 pub fn run(args: &TraceArgs) -> Result<()> {
-    let description = args.scene.load()?;
+    let description = args.scene.load(&args.output)?;
     let rays = npy::read_rays(&args.rays)?;
     match (args.query, args.scene.options.precision(&description)) {
         (Asked::Hits(query), Precision::F32) => trace::<f32>(args, query, &description, &rays),

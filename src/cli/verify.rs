@@ -63,7 +63,7 @@ struct Report<'a> {
 /// # Errors
 /// Bad input; [`Error::Mismatch`] if anything is wrong; [`Error::Interrupted`] after printing what was finished.
 pub fn run(args: &VerifyArgs) -> Result<()> {
-    let description = args.scene.seen_by(&args.camera)?.load()?;
+    let description = args.scene.seen_by(&args.camera)?.load(&args.output)?;
     let workers = Workers::new(args.threads.count())?;
     let mut lines = Vec::new();
     let finished = match args.scene.options.precision {

@@ -1,5 +1,6 @@
 //! `bench --experiment`: every case of a file, one step after the other; what is finished is never measured again.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -49,6 +50,8 @@ pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &O
     bar.reset_eta();
     let begun = Instant::now();
     let (mut measured, mut wrong) = (0, 0);
+    // Many cases are of one scene.
+    let mut said = HashSet::new();
     for case in &experiment.cases {
         let left: Vec<RayKind> = experiment.rays.iter().copied().filter(|kind| !done(case, kind)).collect();
         if left.is_empty() {
@@ -70,7 +73,10 @@ pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &O
             }
             Ok(())
         };
-        let result = measure(&experiment, case, file, &left, embree, &mut step);
+        let result = open(case, file).and_then(|description| {
+            output.warn(description.warnings.iter().filter(|&warning| said.insert(warning.clone())));
+            measure(&experiment, case, &description, &left, embree, &mut step)
+        });
         if result.is_err() {
             bar.finish_and_clear();
             return result.map(|()| folder);
@@ -107,19 +113,23 @@ fn claim(folder: &Path, text: &[u8]) -> Result<()> {
     }
 }
 
+/// The scene of a case in the experiment `file`.
+fn open(case: &Case, file: &Path) -> Result<Description> {
+    let beside = file.parent().unwrap_or(Path::new("")).join(&case.scene);
+    let scene = if beside.is_file() { beside.to_string_lossy().into_owned() } else { case.scene.clone() };
+    load(&scene, &LoadOptions { set: case.set.clone(), ..Default::default() })
+}
+
 type Step<'a> = dyn FnMut(&[Row], RayKind) -> Result<()> + 'a;
 
 fn measure(
     experiment: &Experiment,
     case: &Case,
-    file: &Path,
+    description: &Description,
     kinds: &[RayKind],
     embree: Option<&Path>,
     step: &mut Step<'_>,
 ) -> Result<()> {
-    let beside = file.parent().unwrap_or(Path::new("")).join(&case.scene);
-    let scene = if beside.is_file() { beside.to_string_lossy().into_owned() } else { case.scene.clone() };
-    let description = load(&scene, &LoadOptions { set: case.set.clone(), ..Default::default() })?;
     let workers = Workers::new(case.threads as usize)?.flushing(!case.peers.is_empty());
     let preset = match case.preset.as_str() {
         "fast" => Preset::Fast,
@@ -141,9 +151,9 @@ fn measure(
     };
     let rows = Steps { experiment, pending: Vec::new(), step, failed: None };
     if f64_asked {
-        one::<f64>(&workers, &description, &plan, rows)
+        one::<f64>(&workers, description, &plan, rows)
     } else {
-        one::<f32>(&workers, &description, &plan, rows)
+        one::<f32>(&workers, description, &plan, rows)
     }
 }
 

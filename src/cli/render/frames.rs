@@ -63,7 +63,7 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     let mut wanted = (frames.first..=frames.last).filter(is_wanted);
     let Some(first) = wanted.next() else { return Ok(()) };
     let (of_first, description) = describe(first)?;
-    description.warnings.iter().for_each(|warning| args.output.say(&format!("warning: {warning}")));
+    args.output.warn(&description.warnings);
     if options.integrator == crate::shade::Integrator::Rt {
         check_rt(args, &description)?;
     }
