@@ -35,15 +35,21 @@ pub(super) fn write(target: &Target, film: &Film, info: &ImageInfo, exposure: f3
     }
 }
 
-/// R, G, B and A as one array, every other plane as one of its own.
+/// All files that a picture with the planes `planes` besides the colours is written to, the target's own last.
+pub(super) fn files(target: &Target, planes: &[String]) -> Vec<PathBuf> {
+    let beside = if target.format == Format::Npy { planes } else { &[] };
+    beside.iter().map(|plane| plane_path(&target.path, plane)).chain([target.path.clone()]).collect()
+}
+
+/// R, G, B and A as one array, every other plane as one of its own. The named file comes last: where it is, all are.
 fn write_npy(path: &Path, film: &Film) -> Result<()> {
     let (width, height) = (film.window.width(), film.window.height());
     let colors: Vec<&[f32]> = ["R", "G", "B", "A"].iter().filter_map(|name| film.f32_plane(name)).collect();
-    npy::write_stack(path, width, height, &colors)?;
     film.planes
         .iter()
         .skip(colors.len())
-        .try_for_each(|plane| npy::write_plane(&plane_path(path, &plane.name), width, height, &plane.data))
+        .try_for_each(|plane| npy::write_plane(&plane_path(path, &plane.name), width, height, &plane.data))?;
+    npy::write_stack(path, width, height, &colors)
 }
 
 /// `out.npy` and plane `id.instance` give `out.id.instance.npy`.
@@ -68,6 +74,29 @@ pub(super) fn target(text: &str) -> std::result::Result<Target, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::PlaneData;
+
+    /// Whoever finds the named file finds the others too; they are told beforehand.
+    #[test]
+    fn planes_are_written_before_the_named_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut film = Film::full(1, 1).unwrap();
+        for name in ["R", "G", "B", "A", "Z", "N.X"] {
+            film.push(name, PlaneData::F32(vec![0.5])).unwrap();
+        }
+        let npy = target(&dir.path().join("a.npy").to_string_lossy()).unwrap();
+        let expected = files(&npy, &["Z".into(), "N.X".into()]);
+        assert_eq!(expected, ["a.Z.npy", "a.N.X.npy", "a.npy"].map(|name| dir.path().join(name)));
+        // A folder is in the way of the last plane.
+        std::fs::create_dir(&expected[1]).unwrap();
+        assert!(write(&npy, &film, &ImageInfo::default(), 0.0).is_err());
+        assert!(expected[0].exists() && !expected[2].exists());
+        std::fs::remove_dir(&expected[1]).unwrap();
+        write(&npy, &film, &ImageInfo::default(), 0.0).unwrap();
+        assert!(expected.iter().all(|file| file.is_file()));
+        let png = target("a.png").unwrap();
+        assert_eq!(files(&png, &["Z".into()]), [Path::new("a.png")]);
+    }
 
     #[test]
     fn targets_parse_or_say_what_is_expected() {

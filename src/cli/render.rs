@@ -118,7 +118,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "A..B", value_parser = frames::frames)]
     frames: Option<frames::Frames>,
     /// Keep finished tiles beside the picture, in NAME.tiles, until it is whole, and go on from those that the same command left there
-    /// when it was stopped or killed; with --frames also leave out frames whose files exist
+    /// when it was stopped or killed; with --frames also leave out frames of which all files exist
     #[arg(long)]
     resume: bool,
     #[command(flatten)]

@@ -46,6 +46,11 @@ pub(super) struct Mattes<'a> {
     seen: Mutex<Names>,
 }
 
+/// Names of the planes of mattes, in the order of the film's.
+pub(super) fn planes() -> impl Iterator<Item = String> {
+    LAYERS.iter().flat_map(|layer| cryptomatte::planes(layer))
+}
+
 impl<'a> Mattes<'a> {
     /// Those of a picture of `world` with the planes `aovs`, if they are wanted; their planes are added to `film`.
     pub fn new<S: Real>(
@@ -61,8 +66,8 @@ impl<'a> Mattes<'a> {
         let mut placed = vec![0; assembly.objects.len()];
         assembly.placements.iter().for_each(|placement| placed[placement.object as usize] += 1);
         let (first_plane, pixels) = (film.planes.len(), film.pixels());
-        let names = LAYERS.iter().flat_map(|layer| cryptomatte::planes(layer));
-        film.planes.extend(names.map(|name| Plane { name, data: PlaneData::F32(vec![0.0; pixels]) }));
+        let plane = |name| Plane { name, data: PlaneData::F32(vec![0.0; pixels]) };
+        film.planes.extend(planes().map(plane));
         Some(Self { assembly, description, placed, first_plane, seen: Mutex::default() })
     }
 

@@ -1,6 +1,7 @@
 //! What to render, and who watches.
 
 use super::aov::Aov;
+use super::mattes;
 use crate::camera::{Filter, PixelRect, SubPixel, Tiling};
 use crate::error::{Error, Result};
 use crate::film::Window;
@@ -82,6 +83,17 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
+    /// Names of the picture's planes besides the colours, in the order of the film's.
+    pub fn planes(&self) -> Vec<String> {
+        let planes = |aov: Aov| -> Vec<String> {
+            match aov {
+                Aov::Cryptomatte => mattes::planes().collect(),
+                _ => aov.channels().iter().map(|channel| channel.name.into()).collect(),
+            }
+        };
+        Aov::ALL.into_iter().filter(|aov| self.aovs.contains(aov)).flat_map(planes).collect()
+    }
+
     /// The tiles of the picture, and the window to render, checked.
     ///
     /// # Errors

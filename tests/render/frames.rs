@@ -66,6 +66,26 @@ fn resume_leaves_out_what_is_there() {
     assert!(std::fs::read(dir.path().join("one.png")).unwrap() == whole);
 }
 
+/// Planes of .npy pictures are files of their own: a frame that lacks one was stopped while it was written.
+#[test]
+fn resume_makes_frames_anew_that_are_there_in_part() {
+    let dir = folder();
+    let line = "-o out.npy -o out.png --frames 1..2 --aov Z,N,cryptomatte";
+    render(dir.path(), line);
+    let whole = files(dir.path());
+    let of_frame = |name: &&String| name.starts_with("out.0001.");
+    assert_eq!(whole.iter().filter(of_frame).count(), 1 + 1 + 4 + 24, "colours, PNG, Z and N, mattes: {whole:?}");
+    for name in ["out.0001.N.Y.npy", "out.0001.cryptoMaterial02.A.npy", "out.0001.npy", "out.0001.png"] {
+        std::fs::remove_file(dir.path().join(name)).unwrap();
+        let said = render(dir.path(), &format!("{line} --resume")).err;
+        assert!(
+            said.contains("out.0002.npy: there already") && !said.contains("out.0001.npy: there"),
+            "{name}: {said}"
+        );
+        assert_eq!(files(dir.path()), whole, "{name}");
+    }
+}
+
 #[test]
 fn refusals_say_what_is_expected() {
     let dir = folder();

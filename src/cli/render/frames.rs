@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{RenderArgs, check_rt, options, picture};
 use crate::cli::common::{SceneArgs, with_pool};
+use crate::cli::picture::{Target, files};
 use crate::error::{Error, Result};
 use crate::scene::description::{Description, Precision};
 use crate::scene::kdl::FRAME;
@@ -43,7 +44,7 @@ fn numbered(path: &Path, frame: u32) -> PathBuf {
 /// As [`super::run`]; a frame that is stopped is not written.
 pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     let options = options(args)?;
-    let meshes = Meshes::default();
+    let (meshes, planes) = (Meshes::default(), options.planes());
     let scene = args.scene.seen_by(&args.camera)?;
     let describe = |frame: u32| {
         let mut of_frame = RenderArgs { frames: None, scene: scene.clone(), ..args.clone() };
@@ -54,7 +55,9 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         Ok::<_, Error>((of_frame, description))
     };
     let is_wanted = |frame: &u32| {
-        let is_there = args.resume && args.files.iter().all(|file| numbered(&file.path, *frame).exists());
+        let of_frame = |file: &Target| Target { path: numbered(&file.path, *frame), format: file.format };
+        let mut all = args.files.iter().flat_map(|file| files(&of_frame(file), &planes));
+        let is_there = args.resume && all.all(|file| file.exists());
         if is_there {
             args.output.say(&format!("{}: there already", numbered(Path::new(&args.file()), *frame).display()));
         }
