@@ -57,6 +57,30 @@ fn bad_usage_exits_with_2() {
     assert_eq!(binary::files(path), Vec::<String>::new(), "refusals leave no files");
 }
 
+/// The scene would be opened first: there is none, and nobody asks.
+#[test]
+fn outputs_that_cannot_be_written_are_told_before_the_work() {
+    let dir = folder();
+    std::fs::write(dir.path().join("file"), "").expect("a file");
+    let missing = std::fs::write(dir.path().join("no/a"), "").expect_err("there is no such folder").to_string();
+    let in_the_way = std::fs::write(dir.path().join("file/a"), "").expect_err("no folder").to_string();
+    for (line, name, why) in [
+        ("render none.ply -o ok.png -o no/a.exr", "no/a.exr", &missing),
+        ("render none.kdl -o no/a.npy --aov Z --frames 1..2", "no/a.0001.Z.npy", &missing),
+        ("rays none.ply --kind ao -o no/a.npy", "no/a.npy", &missing),
+        ("trace none.ply --rays none.npy --hits no/a.npy", "no/a.npy", &missing),
+        ("convert none.kdl -o no/a.stl", "no/a.stl", &missing),
+        ("compare none.exr none.exr -o no/a.png", "no/a.png", &missing),
+        ("report none -o no/a.html", "no/a.html", &missing),
+        ("explain none.ply -o file/a", "file/a", &in_the_way),
+        ("bench none.ply -o file/a", "file/a", &in_the_way),
+        ("bench none.ply --record file/a --dirty", "file/a", &in_the_way),
+    ] {
+        refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), &format!("error: {name}: {why}"));
+    }
+    assert_eq!(binary::files(dir.path()), ["file"]);
+}
+
 /// `--eye -1,0,0` is a point, not an option.
 #[test]
 fn negative_coordinates_are_values() {

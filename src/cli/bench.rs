@@ -11,7 +11,7 @@ use super::interrupt::stopped;
 use super::output::{json_to_stdout, to_stdout};
 use super::render::{self, RenderArgs};
 use crate::error::{Error, Result};
-use crate::film::write_atomically;
+use crate::film::{check_folder, write_atomically};
 use crate::measure::bench::{self, Plan};
 use crate::measure::compare;
 use crate::measure::env;
@@ -144,6 +144,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         experiment::run(file, args.folder.as_deref(), args.embree.as_deref(), &args.output)?;
         return Ok(());
     }
+    args.folder.iter().chain(&args.record).try_for_each(|folder| check_folder(folder))?;
     if let Some(other) = &args.against {
         let (_dropped_at_the_end, temporary) = against::temporary()?;
         let changes = against::run(other, args.turns, args.folder.as_ref().unwrap_or(&temporary), &args.output)?;

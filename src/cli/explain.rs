@@ -9,7 +9,7 @@ use super::interrupt::stopped;
 use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
 use crate::film::exr::{Compression, ImageInfo};
-use crate::film::{Film, PlaneData, Window, exr, heat};
+use crate::film::{Film, PlaneData, Window, check_folder, exr, heat};
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
 use crate::measure::explain::{Costs, Maps, Quality, Work, costs, quality, work};
@@ -91,6 +91,7 @@ struct Class {
 /// # Errors
 /// Bad input; [`Error::Interrupted`].
 pub fn run(args: &ExplainArgs) -> Result<()> {
+    args.folder.iter().try_for_each(|folder| check_folder(folder))?;
     let description = args.scene.seen_by(&args.camera)?.load(&args.output)?;
     match args.scene.options.precision(&description) {
         Precision::F32 => explain::<f32>(args, &description),

@@ -35,6 +35,14 @@ pub(super) fn write(target: &Target, film: &Film, info: &ImageInfo, exposure: f3
     }
 }
 
+/// Writes `film` to every target, also when another one cannot be written.
+///
+/// # Errors
+/// The first of those of [`write`].
+pub(super) fn write_each(targets: &[Target], film: &Film, info: &ImageInfo, exposure: f32) -> Result<()> {
+    targets.iter().map(|target| write(target, film, info, exposure)).fold(Ok(()), Result::and)
+}
+
 /// All files that a picture with the planes `planes` besides the colours is written to, the target's own last.
 pub(super) fn files(target: &Target, planes: &[String]) -> Vec<PathBuf> {
     let beside = if target.format == Format::Npy { planes } else { &[] };
@@ -96,6 +104,20 @@ mod tests {
         assert!(expected.iter().all(|file| file.is_file()));
         let png = target("a.png").unwrap();
         assert_eq!(files(&png, &["Z".into()]), [Path::new("a.png")]);
+    }
+
+    #[test]
+    fn a_target_that_cannot_be_written_leaves_the_others() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut film = Film::full(1, 1).unwrap();
+        for name in ["R", "G", "B", "A"] {
+            film.push(name, PlaneData::F32(vec![0.5])).unwrap();
+        }
+        let targets = ["none/a.exr", "ok.exr", "none/b.png", "ok.png"];
+        let targets = targets.map(|name| target(&dir.path().join(name).to_string_lossy()).unwrap());
+        let error = write_each(&targets, &film, &ImageInfo::default(), 0.0).unwrap_err().to_string();
+        assert!(error.starts_with(&targets[0].path.display().to_string()), "{error}");
+        assert!(targets[1].path.is_file() && targets[3].path.is_file());
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::common::{CameraArgs, OutputArgs, SceneArgs, ThreadArgs, with_pool};
 use super::interrupt::stopped;
 use super::output::json_to_stdout;
 use crate::error::{Error, Result};
-use crate::film::npy;
+use crate::film::{check_file, npy};
 use crate::measure::eye::View;
 use crate::measure::raysets::RayKind;
 use crate::ray::Rays;
@@ -68,6 +68,7 @@ struct Report<'a> {
 /// # Errors
 /// Bad input, an output that cannot be written, [`Error::Interrupted`].
 pub fn run(args: &RaysArgs) -> Result<()> {
+    check_file(&args.file)?;
     let description = args.scene.seen_by(&args.camera)?.load(&args.output)?;
     let size = args.camera.size.unwrap_or(DEFAULT_SIZE);
     let rays = with_pool(args.threads.count(), || match args.scene.options.precision(&description) {

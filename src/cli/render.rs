@@ -10,12 +10,12 @@ use indicatif::ProgressBar;
 
 use self::report::{Holds, Made, report, tell};
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
-use super::picture::{Format, Target, target, write};
+use super::picture::{Format, Target, files, target, write_each};
 use super::preview::{Job, PreviewArgs};
 use crate::camera::Filter;
 use crate::error::{Error, Result};
-use crate::film::Window;
 use crate::film::exr::ImageInfo;
+use crate::film::{Window, check_file};
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
 use crate::render::{Aov, Keeper, Progress, RenderOptions};
@@ -156,6 +156,12 @@ impl RenderArgs {
         self.resume && self.noise.is_none() && self.time_limit.is_none() && !self.preview.by_blocks()
     }
 
+    /// Checks that all files of the picture can be written.
+    fn check_files(&self, options: &RenderOptions) -> Result<()> {
+        let planes = options.planes();
+        self.files.iter().flat_map(|file| files(file, &planes)).try_for_each(|file| check_file(&file))
+    }
+
     /// Whether all that is wanted of the picture are the levels of `.pix` files.
     fn holds_levels(&self) -> bool {
         !self.preview.by_blocks() && self.files.iter().all(|file| file.format == Format::Pix)
@@ -202,6 +208,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         return frames::run(args, frames);
     }
     let options = options(args)?;
+    args.check_files(&options)?;
     still(args, &args.scene.seen_by(&args.camera)?.load(&args.output)?, &options)
 }
 
@@ -365,7 +372,7 @@ fn picture<S: Shades>(
     };
     // Without a finished tile there is nothing to show, and an older picture is worth more.
     if output.is_complete() || partly && output.tiles_done > 0 {
-        args.files.iter().try_for_each(|file| write(file, &output.film, &info, args.exposure))?;
+        write_each(&args.files, &output.film, &info, args.exposure)?;
     }
     if let (true, Some(keeper)) = (output.is_complete(), &keeper) {
         keeper.remove()?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::common::{OutputArgs, ThreadArgs, with_pool};
 use super::output::json_to_stdout;
 use crate::error::{Error, Result};
-use crate::film::write_atomically;
+use crate::film::{check_file, write_atomically};
 use crate::measure::{env, report};
 
 const EXAMPLES: &str = "\
@@ -58,6 +58,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     if let Some(file) = &args.readme {
         return readme(args, file);
     }
+    check_file(&args.file)?;
     let options = report::Options { title: args.title.clone(), command: env::command_line(), date: env::now() };
     let (page, summary) = with_pool(args.threads.count(), || report::html(&args.folder, &options))?;
     write_atomically(&args.file, |file| file.write_all(page.as_bytes()))?;
@@ -70,6 +71,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
 }
 
 fn readme(args: &ReportArgs, file: &Path) -> Result<()> {
+    check_file(file)?;
     let (text, tables) = report::figures_in(file, &args.folder)?;
     let changed = std::fs::read(file).map_err(|e| Error::io(file, e))? != text.as_bytes();
     if changed {

@@ -11,7 +11,7 @@ use super::common::{EngineArgs, OutputArgs, SceneArgs, ThreadArgs};
 use super::interrupt::stopped;
 use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
-use crate::film::npy;
+use crate::film::{check_file, npy};
 use crate::lanes::compiled_isa;
 use crate::measure::answers::Answers;
 use crate::measure::raysets::{Query, split};
@@ -159,6 +159,7 @@ struct Bytes {
 /// # Errors
 /// Bad input; [`Error::Mismatch`] if the engine's hits are not the `scalar` engine's; [`Error::Interrupted`].
 pub fn run(args: &TraceArgs) -> Result<()> {
+    args.hits.iter().try_for_each(|file| check_file(file))?;
     let description = args.scene.load(&args.output)?;
     let rays = npy::read_rays(&args.rays)?;
     match (args.query, args.scene.options.precision(&description)) {

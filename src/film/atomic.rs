@@ -22,12 +22,31 @@ pub fn write_atomically<T>(path: &Path, write: impl FnOnce(&mut Writer<'_>) -> i
     replace(path, write).map_err(|e| Error::io(path, e))
 }
 
+/// Checks that [`write_atomically`] can write `path`, before work starts that would be lost: a temporary file is made
+/// beside it and removed.
+///
+/// # Errors
+/// [`Error::Io`] with `path`: no such folder, no right to write there, a directory or device of that name.
+pub fn check_file(path: &Path) -> Result<()> {
+    let check = || {
+        let target = resolve(path)?;
+        temp_file(&target, folder_of(&target)).map(drop)
+    };
+    check().map_err(|e| Error::io(path, e))
+}
+
+/// Checks that files can be written to the folder `path`, which is there or can be made; none is made.
+///
+/// # Errors
+/// [`Error::Io`] with `path`.
+pub fn check_folder(path: &Path) -> Result<()> {
+    let there = path.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("."));
+    temp_file(Path::new("check"), there).map(drop).map_err(|e| Error::io(path, e))
+}
+
 fn replace<T>(path: &Path, write: impl FnOnce(&mut Writer<'_>) -> io::Result<T>) -> io::Result<T> {
     let target = resolve(path)?;
-    let dir = match target.parent() {
-        Some(dir) if !dir.as_os_str().is_empty() => dir,
-        _ => Path::new("."),
-    };
+    let dir = folder_of(&target);
     let mut temp = temp_file(&target, dir)?;
     let mut writer = BufWriter::new(temp.as_file_mut());
     let value = write(&mut writer)?;
@@ -37,6 +56,13 @@ fn replace<T>(path: &Path, write: impl FnOnce(&mut Writer<'_>) -> io::Result<T>)
     temp.persist(&target).map_err(|e| e.error)?;
     sync_directory(dir);
     Ok(value)
+}
+
+fn folder_of(target: &Path) -> &Path {
+    match target.parent() {
+        Some(dir) if !dir.as_os_str().is_empty() => dir,
+        _ => Path::new("."),
+    }
 }
 
 /// The file to replace: symbolic links followed, anything but a regular file or a new name refused.
@@ -54,12 +80,9 @@ fn temp_file(target: &Path, dir: &Path) -> io::Result<tempfile::NamedTempFile> {
         .file_name()
         .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "expected a path that ends in a file name"))?;
     let prefix = format!(".{}.", name.to_string_lossy());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(".tmp");
-    // Temporary files are private by default; this one becomes an ordinary output, so only the umask limits it.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(dir)
+    // Made by hand, an ordinary file: only the umask limits its rights, and errors do not name it.
+    let make = |path: &Path| File::create_new(path);
+    tempfile::Builder::new().prefix(&prefix).suffix(".tmp").make_in(dir, make)
 }
 
 /// Makes the rename itself durable. The new file is already in place and whole, so a file system that cannot sync
@@ -129,9 +152,31 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let is_dir = write_atomically(dir.path(), |_| Ok(())).unwrap_err().to_string();
         assert!(is_dir.contains("expected a regular file"), "{is_dir}");
-        assert!(write_atomically(&dir.path().join("none/a"), |_| Ok(())).is_err());
+        // The error names the file, not the temporary one.
+        let missing = dir.path().join("none/a");
+        let system = fs::write(&missing, "").unwrap_err();
+        let error = write_atomically(&missing, |_| Ok(())).unwrap_err().to_string();
+        assert_eq!(error, format!("{}: {system}", missing.display()));
         assert!(write_atomically(Path::new(""), |_| Ok(())).is_err());
         assert_eq!(names_in(dir.path()), Vec::<String>::new());
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_told_beforehand() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("file");
+        fs::write(&file, b"old").unwrap();
+        for (path, fine) in [("file", true), ("new", true), ("none/new", false), ("file/new", false), (".", false)] {
+            let path = dir.path().join(path);
+            assert_eq!(check_file(&path).is_ok(), fine, "{}", path.display());
+            assert_eq!(write_atomically(&path, |w| w.write_all(b"old")).is_ok(), fine, "{}", path.display());
+        }
+        for (path, fine) in [(".", true), ("none/new", true), ("file", false), ("file/new", false)] {
+            assert_eq!(check_folder(&dir.path().join(path)).is_ok(), fine, "{path}");
+        }
+        assert!(check_folder(Path::new("surely/not/there")).is_ok());
+        assert_eq!(names_in(dir.path()), ["file", "new"]);
+        assert_eq!(fs::read(&file).unwrap(), b"old");
     }
 
     #[cfg(unix)]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{RenderArgs, check_rt, options, picture};
 use crate::cli::common::{SceneArgs, with_pool};
-use crate::cli::picture::{Target, files};
+use crate::cli::picture::files;
 use crate::error::{Error, Result};
 use crate::scene::description::{Description, Precision};
 use crate::scene::kdl::FRAME;
@@ -46,25 +46,28 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     let options = options(args)?;
     let (meshes, planes) = (Meshes::default(), options.planes());
     let scene = args.scene.seen_by(&args.camera)?;
-    let describe = |frame: u32| {
+    let of_frame = |frame: u32| {
         let mut of_frame = RenderArgs { frames: None, scene: scene.clone(), ..args.clone() };
         of_frame.files.iter_mut().for_each(|file| file.path = numbered(&file.path, frame));
         of_frame.scene.options.set.push((FRAME.into(), frame.to_string()));
+        of_frame
+    };
+    let describe = |of_frame: RenderArgs| {
         let SceneArgs { scene, options } = &of_frame.scene;
         let description = options.load_with(scene, &|path, references| meshes.read(path, references))?;
         Ok::<_, Error>((of_frame, description))
     };
-    let is_wanted = |frame: &u32| {
-        let of_frame = |file: &Target| Target { path: numbered(&file.path, *frame), format: file.format };
-        let mut all = args.files.iter().flat_map(|file| files(&of_frame(file), &planes));
+    let is_wanted = |of_frame: &RenderArgs| {
+        let mut all = of_frame.files.iter().flat_map(|file| files(file, &planes));
         let is_there = args.resume && all.all(|file| file.exists());
         if is_there {
-            args.output.say(&format!("{}: there already", numbered(Path::new(&args.file()), *frame).display()));
+            args.output.say(&format!("{}: there already", of_frame.file()));
         }
         !is_there
     };
-    let mut wanted = (frames.first..=frames.last).filter(is_wanted);
+    let mut wanted = (frames.first..=frames.last).map(of_frame).filter(is_wanted);
     let Some(first) = wanted.next() else { return Ok(()) };
+    first.check_files(&options)?;
     let (of_first, description) = describe(first)?;
     args.output.warn(&description.warnings);
     if options.integrator == crate::shade::Integrator::Rt {
