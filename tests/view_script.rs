@@ -52,6 +52,17 @@ fn the_view_is_the_rendered_picture() {
     }
 }
 
+/// Light that scatters more often than a mirror is followed: as deep as render goes, whether begun with or changed to.
+#[test]
+fn paths_are_as_long_as_those_of_render() {
+    let dir = folder("wait\nsave begun.exr\nintegrator whitted\nintegrator path\nwait\nsave changed.exr\n");
+    view(dir.path(), "builtin:cornell --size 32x20 --integrator path --spp 2");
+    let want = render(dir.path(), "builtin:cornell --size 32x20 --integrator path --spp 2");
+    for name in ["begun.exr", "changed.exr"] {
+        assert!(exr::read(&dir.path().join(name)).unwrap() == want, "{name}");
+    }
+}
+
 /// Views of BRL-CAD's `rt` too, which sample pixels at a corner, and again after a way out and home.
 #[test]
 fn a_view_of_rt_is_the_rendered_picture() {
@@ -132,6 +143,7 @@ fn refusals_say_what_is_expected() {
         ("camera front", "script.txt:1:1: no camera `front`; there are: none"),
         ("engine skalar", "script.txt:1:1: no engine `skalar`"),
         ("integrator normal", "did you mean `normals`?"),
+        ("integrator rt", "script.txt:1:1: the integrator `rt` shows BRL-CAD databases only"),
         ("fov 200", "between 0 and 180"),
         ("spp 0", "samples per pixel"),
         ("blocks 3", "16, 8, 4, 2 or 1"),
@@ -142,6 +154,14 @@ fn refusals_say_what_is_expected() {
         let ended = lanecast(dir.path(), &arguments);
         assert_eq!(ended.code, Some(2), "{script}: {}", ended.err);
         assert!(ended.err.contains(what) && !ended.err.contains("panicked"), "{script}: {}", ended.err);
+    }
+    std::fs::write(dir.path().join("script.txt"), "wait").unwrap();
+    for (line, what) in [
+        ("view square.ply --exact --engine tile", "--exact: tile has an arithmetic of its own"),
+        ("view square.ply --engine skalar", "skalar"),
+        ("view square.ply --integrator rt", "BRL-CAD databases"),
+    ] {
+        refused(dir.path(), &format!("{line} --headless-script script.txt").split(' ').collect::<Vec<_>>(), what);
     }
     let builtin = ["view", "builtin:die", "--headless-script", "script.txt"];
     std::fs::write(dir.path().join("script.txt"), "reload 1").unwrap();

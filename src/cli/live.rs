@@ -7,6 +7,7 @@ use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, SceneOptions,
 use super::interrupt::stopped;
 use super::output::json_to_stdout;
 use super::picture::{target, write};
+use super::render::check_rt;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::film::exr::ImageInfo;
@@ -51,7 +52,7 @@ pub struct ViewArgs {
     scene: SceneArgs,
     #[command(flatten)]
     camera: CameraArgs,
-    /// What to show first: whitted, ao, normals, depth, cost or rt
+    /// What to show first: whitted, path (all light), ao, normals, depth, cost or rt (BRL-CAD databases only)
     #[arg(long, value_name = "NAME", default_value = Integrator::Whitted.name())]
     integrator: Integrator,
     /// Samples per pixel
@@ -148,12 +149,20 @@ fn view(args: &ViewArgs, stage: &dyn Stage) -> Result<View> {
     let camera = args.camera.choose(description, bounds, size)?;
     let home = camera.clone();
     let rt = args.camera.rt_view(description, bounds)?.map(|view| (camera.clone(), view));
+    match args.scene.options.precision(description) {
+        Precision::F32 => args.engine.find::<f32>().map(drop)?,
+        Precision::F64 => args.engine.find::<f64>().map(drop)?,
+    }
     let engine = match args.engine.engine.as_str() {
         "auto" => EXACT_ENGINE.to_string(),
         name => name.to_string(),
     };
-    let spp = args.spp;
-    let options = RenderOptions { width, height, spp, integrator: args.integrator, engine, ..Default::default() };
+    let (spp, integrator) = (args.spp, args.integrator);
+    if integrator == Integrator::Rt {
+        check_rt(description, args.scene.options.lenient, &args.output)?;
+    }
+    let depth = integrator.depth();
+    let options = RenderOptions { width, height, spp, integrator, depth, engine, ..Default::default() };
     options.check()?;
     let look = Look { camera, rt, options, start: LARGEST_BLOCK, heat: None };
     Ok(View { look, home, exposure: args.exposure })

@@ -28,8 +28,6 @@ const DEFAULT_SIZE: (u32, u32) = (960, 540);
 
 /// Samples per pixel of path tracing unless `--spp` says otherwise.
 const PATH_SAMPLES: u32 = 64;
-/// Scatterings of a path unless `--depth` says otherwise.
-const PATH_DEPTH: u32 = 16;
 /// Samples per pixel at most where time or noise decides.
 const MOST_SAMPLES: u32 = 1 << 16;
 
@@ -222,7 +220,7 @@ pub(super) fn of_scene(args: &RenderArgs, description: &Description) -> Result<(
 
 fn still(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
     if options.integrator == Integrator::Rt {
-        check_rt(args, description)?;
+        check_rt(description, args.scene.options.lenient, &args.output)?;
     }
     with_pool(args.threads.count(), || match args.scene.options.precision(description) {
         Precision::F32 => compiled::<f32>(args, description, options),
@@ -236,19 +234,22 @@ fn compiled<S: Shades>(args: &RenderArgs, description: &Description, options: &R
     picture(args, description, options, &world, true)
 }
 
-/// Whether `rt`'s lighting model knows all that the scene asks of it.
-fn check_rt(args: &RenderArgs, description: &Description) -> Result<()> {
+/// Whether `rt`'s lighting model knows all that the scene asks of it; if `lenient`, what it does not know is said.
+///
+/// # Errors
+/// [`Error::Usage`] for scenes of other kinds and, unless `lenient`, shaders that are not known.
+pub(super) fn check_rt(description: &Description, lenient: bool, output: &OutputArgs) -> Result<()> {
     let Some(looks) = &description.looks else {
-        return Err(Error::Usage(
-            "--rt-compat shows BRL-CAD databases: expected a scene file that ends in .asc or .g".into(),
-        ));
+        let what =
+            "rt (--integrator rt, --rt-compat) shows BRL-CAD databases: expected a scene file that ends in .asc or .g";
+        return Err(Error::Usage(what.into()));
     };
     for (shader, region) in unknown_shaders(looks) {
         let what = format!("the shader `{shader}` of region {region} is not supported");
-        if !args.scene.options.lenient {
+        if !lenient {
             return Err(Error::Usage(format!("{what}; --lenient shows it as plastic")));
         }
-        args.output.say(&format!("warning: {what}: shown as plastic"));
+        output.warn([&format!("{what}: shown as plastic")]);
     }
     Ok(())
 }
@@ -286,7 +287,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         integrator,
         engine: args.engine.engine.clone(),
         tile: args.tile,
-        depth: args.depth.unwrap_or(if is_path { PATH_DEPTH } else { 4 }),
+        depth: args.depth.unwrap_or(integrator.depth()),
         ao_samples: args.ao_samples,
         ao_radius: args.ao_radius,
         aovs: Aov::parse_list(&args.aov)?,

@@ -72,7 +72,7 @@ impl Default for RenderOptions {
             integrator: Integrator::default(),
             engine: "auto".into(),
             tile: 32,
-            depth: 4,
+            depth: Integrator::default().depth(),
             ao_samples: 16,
             ao_radius: 0.2,
             aovs: Vec::new(),

@@ -41,6 +41,11 @@ impl Integrator {
         }
     }
 
+    /// Mirrors or scatterings followed unless somebody asks for more or less: a path's light keeps scattering.
+    pub fn depth(self) -> u32 {
+        if self == Self::Path { 16 } else { 4 }
+    }
+
     /// Whether pictures are made of what samples say of first hits.
     pub(super) fn shows_hits(self) -> bool {
         matches!(self, Self::Normals | Self::Depth)

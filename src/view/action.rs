@@ -5,6 +5,7 @@ use super::pilot;
 use super::stage::{Look, Stage};
 use crate::camera::framing;
 use crate::error::{Error, Result, nearest_name};
+use crate::render::RenderOptions;
 use crate::scene::description::{CameraDescription, Projection};
 use crate::shade::Integrator;
 use crate::trace::EXACT_ENGINE;
@@ -96,8 +97,11 @@ impl View {
                 }
             }
             Action::Reset => *camera = self.home.clone(),
-            Action::Integrator(name) => options.integrator = name.parse()?,
-            Action::NextIntegrator => options.integrator = after(&Integrator::ALL, options.integrator),
+            Action::Integrator(name) => show(options, known_integrator(stage, name)?),
+            Action::NextIntegrator => {
+                let all: Vec<Integrator> = Integrator::ALL.into_iter().filter(|&i| can_show(stage, i)).collect();
+                show(options, after(&all, options.integrator));
+            }
             Action::Engine(name) => options.engine = known_engine(stage, name)?,
             Action::NextEngine => {
                 let engines = stage.engines();
@@ -114,7 +118,7 @@ impl View {
             }
             Action::Exposure(stops) => self.exposure = (self.exposure + *stops as f32).clamp(-30.0, 30.0),
             Action::Samples(spp) => {
-                let changed = crate::render::RenderOptions { spp: *spp, ..options.clone() };
+                let changed = RenderOptions { spp: *spp, ..options.clone() };
                 changed.check()?;
                 *options = changed;
             }
@@ -131,6 +135,24 @@ impl View {
 fn after<T: Copy + PartialEq>(all: &[T], now: T) -> T {
     let at = all.iter().position(|x| *x == now).map_or(0, |i| (i + 1) % all.len());
     all[at]
+}
+
+/// Makes `options` those of a picture by `integrator`, as deep as it goes by itself.
+fn show(options: &mut RenderOptions, integrator: Integrator) {
+    (options.integrator, options.depth) = (integrator, integrator.depth());
+}
+
+fn known_integrator(stage: &dyn Stage, name: &str) -> Result<Integrator> {
+    let integrator = name.parse()?;
+    if can_show(stage, integrator) {
+        return Ok(integrator);
+    }
+    Err(Error::Usage(format!("the integrator `{name}` shows BRL-CAD databases only")))
+}
+
+/// Whether the scene has what `integrator` needs.
+fn can_show(stage: &dyn Stage, integrator: Integrator) -> bool {
+    integrator != Integrator::Rt || stage.description().looks.is_some()
 }
 
 fn known_engine(stage: &dyn Stage, name: &str) -> Result<String> {

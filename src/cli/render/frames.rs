@@ -71,7 +71,7 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     let (of_first, description) = describe(first)?;
     args.output.warn(&description.warnings);
     if options.integrator == crate::shade::Integrator::Rt {
-        check_rt(args, &description)?;
+        check_rt(&description, args.scene.options.lenient, &args.output)?;
     }
     let rest = wanted.map(describe);
     with_pool(args.threads.count(), || match args.scene.options.precision(&description) {

@@ -22,7 +22,7 @@ const CLICK: f64 = 3.0;
 pub const HELP: [&str; 12] = [
     "drag: orbit    right drag: turn    middle or shift drag: pan    wheel: zoom    click: what is there",
     "arrows: orbit    W A S D, page up, page down: fly    [ ]: field of view    Home: back",
-    "I: integrator (1 whitted, 2 ao, 3 normals, 4 depth, 5 cost)",
+    "I: next integrator, also path and rt (1 whitted, 2 ao, 3 normals, 4 depth, 5 cost)",
     "E: engine",
     "H: map of node visits, primitive tests, lane use",
     "C: next camera",
