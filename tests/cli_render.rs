@@ -101,6 +101,8 @@ fn refusals_say_what_is_expected() {
         ("render square.ply -o a.exr --ao-radius -1", "radius"),
         ("render square.ply -o no/such/folder/a.exr", "no/such/folder"),
         ("render none.ply -o a.exr", "none.ply"),
+        ("render none.asc -o a.exr --rt-compat --integrator path", "it cannot be path, too"),
+        ("render square.ply -o a.exr --rt-compat --integrator rt", "BRL-CAD databases"),
     ] {
         refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);
     }

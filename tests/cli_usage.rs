@@ -57,6 +57,27 @@ fn bad_usage_exits_with_2() {
     assert_eq!(binary::files(path), Vec::<String>::new(), "refusals leave no files");
 }
 
+#[test]
+fn options_of_other_kinds_of_scenes_are_refused() {
+    let dir = folder();
+    for (scene, what) in [("builtin:die", "--apart"), ("a.glb", "--set n"), ("a.g", "--set n"), ("a.obj.gz", "--set n")]
+    {
+        let why = if what == "--apart" { "is no glTF file" } else { "has no parameters" };
+        let options = if what == "--apart" { vec!["--apart"] } else { vec!["--set", "n=1"] };
+        refused(dir.path(), &[&["info", scene][..], &options[..]].concat(), &format!("{what}: {scene} {why}"));
+    }
+    for scene in ["builtin:die", "a.kdl", "a.glb", "a.ply"] {
+        for (option, more) in [("--top", &["all.g"][..]), ("--lenient", &[][..])] {
+            let what = format!("{}: {scene} is no BRL-CAD database", [&[option][..], more].concat().join(" "));
+            refused(dir.path(), &[&["info", scene, option][..], more].concat(), &what);
+        }
+    }
+    // Where they mean something, the file is looked for.
+    for line in ["info a.asc --top all.g --lenient", "info a.gltf --apart", "info a.kdl --set n=1"] {
+        refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), "No such file");
+    }
+}
+
 /// The scene would be opened first: there is none, and nobody asks.
 #[test]
 fn outputs_that_cannot_be_written_are_told_before_the_work() {

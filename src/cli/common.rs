@@ -159,10 +159,8 @@ impl SceneOptions {
     /// Those of [`load_with`].
     pub fn load_with(&self, scene: &str, read: &ReadMesh<'_>) -> Result<Description> {
         let brlcad = Options { tops: self.top.clone(), lenient: self.lenient };
-        let options = LoadOptions { set: self.set.clone(), allow_outside: self.allow_outside, brlcad };
-        let mut description = load_with(scene, &options, read)?;
-        description.joins &= !self.apart;
-        Ok(description)
+        let (set, allow_outside, apart) = (self.set.clone(), self.allow_outside, self.apart);
+        load_with(scene, &LoadOptions { set, brlcad, allow_outside, apart }, read)
     }
 
     /// The precision asked for here, else by the scene, else f32.

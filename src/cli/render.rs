@@ -66,10 +66,11 @@ pub struct RenderArgs {
     /// Part of the picture to render, pixels, y down, half open
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = crop, help_heading = "Camera")]
     crop: Option<Window>,
-    /// What to show: whitted, path (all light), ao, normals, depth, cost or rt (as --rt-compat)
-    #[arg(long, value_name = "NAME", default_value = Integrator::Whitted.name())]
-    integrator: Integrator,
-    /// Show a BRL-CAD database as BRL-CAD's own `rt -B -J0` does: its shaders, lights, default view and 512x512 pixels
+    /// What to show: whitted, path (all light), ao, normals, depth, cost or rt (BRL-CAD databases as BRL-CAD's own rt shades
+    /// them) [default: whitted]
+    #[arg(long, value_name = "NAME")]
+    integrator: Option<Integrator>,
+    /// Show a BRL-CAD database as BRL-CAD's own `rt -B -J0` does: --integrator rt with its default view and 512x512 pixels
     #[arg(long)]
     rt_compat: bool,
     /// Samples per pixel [default: 1; 64 with path, as many as needed with --time-limit or --noise]
@@ -172,7 +173,7 @@ impl RenderArgs {
             files: vec![Target { path, format: Format::Exr }],
             camera,
             crop: None,
-            integrator: Integrator::Whitted,
+            integrator: None,
             rt_compat: false,
             spp: Some(1),
             time_limit: None,
@@ -267,7 +268,13 @@ fn warn_of_unaimed(args: &RenderArgs, count: u64) {
 /// The options, checked before a long build starts.
 fn options(args: &RenderArgs) -> Result<RenderOptions> {
     let (width, height) = args.camera.size.unwrap_or(if args.rt_compat { RT_SIZE } else { DEFAULT_SIZE });
-    let integrator = if args.rt_compat { Integrator::Rt } else { args.integrator };
+    let integrator = match args.integrator {
+        Some(other) if args.rt_compat && other != Integrator::Rt => {
+            return Err(Error::Usage(format!("--rt-compat is --integrator rt: it cannot be {}, too", other.name())));
+        }
+        None if args.rt_compat => Integrator::Rt,
+        chosen => chosen.unwrap_or_default(),
+    };
     let is_path = integrator == Integrator::Path;
     let spp = match args.spp {
         Some(spp) => spp,

@@ -18,6 +18,11 @@ use crate::error::{Error, Result, nearest_name};
 /// Extensions that [`load`] reads; all but `kdl` may also be packed (`.ply.gz`, `.glb.zst`).
 pub const EXTENSIONS: [&str; 8] = ["kdl", "obj", "ply", "stl", "gltf", "glb", "asc", "g"];
 
+/// Kind of our own scene files, which the built-in ones are too.
+const SCENE_FILE: &str = "kdl";
+/// Kinds of BRL-CAD databases.
+const DATABASES: [&str; 2] = ["asc", "g"];
+
 /// How to open a scene.
 #[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
@@ -27,6 +32,8 @@ pub struct LoadOptions {
     pub brlcad: brlcad::describe::Options,
     /// Allow references to files that leave the scene file's folder.
     pub allow_outside: bool,
+    /// Of a glTF file: trace each mesh that it places as an instance.
+    pub apart: bool,
 }
 
 /// How a mesh file is read.
@@ -35,7 +42,8 @@ pub type ReadMesh<'a> = dyn Fn(&Path, &References<'_>) -> Result<MeshFile> + 'a;
 /// Opens `scene`: `builtin:NAME` or a path.
 ///
 /// # Errors
-/// Unknown built-in names and extensions, unreadable or malformed files, unknown `--set` names.
+/// Unknown built-in names and extensions, unreadable or malformed files, unknown `--set` names, options that mean
+/// nothing to a scene of its kind.
 pub fn load(scene: &str, options: &LoadOptions) -> Result<Description> {
     load_with(scene, options, &read_mesh)
 }
@@ -45,11 +53,13 @@ pub fn load(scene: &str, options: &LoadOptions) -> Result<Description> {
 /// # Errors
 /// As [`load`], and those of `read`.
 pub fn load_with(scene: &str, options: &LoadOptions, read: &ReadMesh<'_>) -> Result<Description> {
+    let kind = kind(scene)?;
+    check_options(scene, &kind, options)?;
     if let Some(name) = scene.strip_prefix("builtin:") {
         return builtin::load(name, &options.set);
     }
     let path = Path::new(scene);
-    let mut description = match extension(path)?.as_str() {
+    let mut description = match kind.as_str() {
         "kdl" => scene_file(path, options, read)?,
         "gltf" | "glb" => gltf_scene(path, options)?,
         "asc" | "g" => database(path, options)?,
@@ -72,14 +82,15 @@ fn scene_file(path: &Path, options: &LoadOptions, read: &ReadMesh<'_>) -> Result
 }
 
 fn gltf_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
-    refuse_set(path, options)?;
     let bytes = unpack::read_file(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    gltf::parse(path, &stem(path), &bytes, &References { folder: Some(folder), allow_outside: options.allow_outside })
+    let references = References { folder: Some(folder), allow_outside: options.allow_outside };
+    let mut description = gltf::parse(path, &stem(path), &bytes, &references)?;
+    description.joins &= !options.apart;
+    Ok(description)
 }
 
 fn database(path: &Path, options: &LoadOptions) -> Result<Description> {
-    refuse_set(path, options)?;
     let bytes = unpack::read_file(path)?;
     let database = brlcad::parse(path, &bytes)?;
     let mut description = brlcad::describe::describe(path, &stem(path), &database, &options.brlcad)?;
@@ -89,17 +100,27 @@ fn database(path: &Path, options: &LoadOptions) -> Result<Description> {
     Ok(description)
 }
 
-/// Only our own scene files have parameters.
-fn refuse_set(path: &Path, options: &LoadOptions) -> Result<()> {
-    match options.set.first() {
-        Some((name, _)) => Err(Error::Usage(format!("--set {name}: {} has no parameters", path.display()))),
+/// Refuses options that mean nothing to a scene of kind `kind`: whoever gave them meant another one.
+fn check_options(scene: &str, kind: &str, options: &LoadOptions) -> Result<()> {
+    let unknown = |option: &str, why: &str| Err(Error::Usage(format!("{option}: {scene} {why}")));
+    if let (Some((name, _)), false) = (options.set.first(), kind == SCENE_FILE) {
+        return unknown(&format!("--set {name}"), "has no parameters");
+    }
+    if options.apart && !["gltf", "glb"].contains(&kind) {
+        return unknown("--apart", "is no glTF file");
+    }
+    if DATABASES.contains(&kind) {
+        return Ok(());
+    }
+    match options.brlcad.tops.first() {
+        Some(top) => unknown(&format!("--top {top}"), "is no BRL-CAD database"),
+        None if options.brlcad.lenient => unknown("--lenient", "is no BRL-CAD database"),
         None => Ok(()),
     }
 }
 
 /// A scene of one mesh.
 fn mesh_scene(path: &Path, options: &LoadOptions, read: &ReadMesh<'_>) -> Result<Description> {
-    refuse_set(path, options)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let references = References { folder: Some(folder), allow_outside: options.allow_outside };
     let MeshFile { mut mesh, digest, looks } = read(path, &references)?;
@@ -151,8 +172,17 @@ pub fn read_mesh(path: &Path, references: &References<'_>) -> Result<MeshFile> {
 
 /// Whether `scene` is a BRL-CAD database, by its name.
 pub fn is_database(scene: &str) -> bool {
-    let inner = unpack::inner_extension(Path::new(scene)).unwrap_or_default();
-    !scene.starts_with("builtin:") && ["asc", "g"].contains(&inner.as_str())
+    kind(scene).is_ok_and(|kind| DATABASES.contains(&kind.as_str()))
+}
+
+/// Whether `scene` can have parameters, by its name: built-in scenes and scene files of our own.
+pub fn has_parameters(scene: &str) -> bool {
+    kind(scene).is_ok_and(|kind| kind == SCENE_FILE)
+}
+
+/// The kind of file that `scene` is: one of [`EXTENSIONS`].
+fn kind(scene: &str) -> Result<String> {
+    if scene.starts_with("builtin:") { Ok(SCENE_FILE.into()) } else { extension(Path::new(scene)) }
 }
 
 /// The known extension of `path`, lower case, without the packing's.

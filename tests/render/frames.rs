@@ -93,6 +93,8 @@ fn refusals_say_what_is_expected() {
         ("render scene.kdl -o a.exr --frames 3..1", "expected A..B"),
         ("render scene.kdl -o a.exr --frames 3", "expected A..B"),
         ("render scene.kdl -o a.exr --resume", "--frames"),
+        ("render scene.kdl -o a.exr --frames 1..2 --set frame=7", "--set frame: --frames sets it"),
+        ("render scene.obj -o a.exr --frames 1..2", "--frames: scene.obj has no parameters"),
     ] {
         refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);
     }

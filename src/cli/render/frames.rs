@@ -8,6 +8,7 @@ use crate::cli::picture::files;
 use crate::error::{Error, Result};
 use crate::scene::description::{Description, Precision};
 use crate::scene::kdl::FRAME;
+use crate::scene::load::has_parameters;
 use crate::scene::world::World;
 use crate::shade::Shades;
 use crate::view::meshes::Meshes;
@@ -44,6 +45,13 @@ fn numbered(path: &Path, frame: u32) -> PathBuf {
 /// As [`super::run`]; a frame that is stopped is not written.
 pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     let options = options(args)?;
+    let SceneArgs { scene, options: of_scene } = &args.scene;
+    if !has_parameters(scene) {
+        return Err(Error::Usage(format!("--frames: {scene} has no parameters, so no `{FRAME}` that could change it")));
+    }
+    if of_scene.set.iter().any(|(name, _)| name == FRAME) {
+        return Err(Error::Usage(format!("--set {FRAME}: --frames sets it")));
+    }
     let (meshes, planes) = (Meshes::default(), options.planes());
     let scene = args.scene.seen_by(&args.camera)?;
     let of_frame = |frame: u32| {
