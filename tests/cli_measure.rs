@@ -185,6 +185,19 @@ fn info_counts_and_measures() {
     assert!(text.contains("primitives") && text.contains("SAH cost"), "{text}");
 }
 
+/// What is dropped is counted in no instance.
+#[test]
+fn dropped_triangles_are_in_no_instance() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    // The second triangle has no area.
+    std::fs::write(dir.path().join("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n").expect("a mesh");
+    let scene = "define \"m\" { mesh \"m.obj\" }\n".to_owned() + &"instance \"m\" { translate 2 0 0 }\n".repeat(3);
+    std::fs::write(dir.path().join("s.kdl"), scene).expect("a scene");
+    let counts = run(&dir, "info s.kdl --json").json()["counts"].clone();
+    let of = ["primitives", "instanced_primitives", "dropped_degenerate"].map(|key| counts[key].as_u64());
+    assert_eq!(of, [Some(1), Some(3), Some(1)], "{counts}");
+}
+
 /// Two nodes with one mesh, a triangle, one of them turned on its side.
 const TWO_NODES: &str = r#"{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
     "nodes": [{"mesh": 0, "translation": [5, 0, 0]}, {"mesh": 0, "rotation": [0.6, 0, 0, 0.8]}],

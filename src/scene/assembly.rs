@@ -151,7 +151,7 @@ impl Assembly {
         Ok(Self { placements: walk.placements, objects })
     }
 
-    /// Number of primitives over all placements.
+    /// Number of primitives over all placements, also of those that a world drops.
     pub fn instanced_prims(&self) -> u64 {
         self.placements.iter().map(|p| u64::from(self.objects[p.object as usize].prim_count)).sum()
     }

@@ -33,7 +33,7 @@ pub use totals::Totals;
 
 use self::facets::Facets;
 use self::runs::Runs;
-use super::assembly::Assembly;
+use super::assembly::{Assembly, Placement};
 use super::description::Shape;
 use crate::bvh::Tree;
 use crate::csg;
@@ -230,6 +230,12 @@ struct Counts {
     singular: u64,
 }
 
+impl Counts {
+    fn all(&self) -> u64 {
+        self.nonfinite + self.degenerate + self.singular
+    }
+}
+
 /// Counts and sizes of a world, for `info` and `trace --json`.
 #[derive(Clone, Debug, Default)]
 pub struct WorldStats {
@@ -241,7 +247,7 @@ pub struct WorldStats {
     pub joined: u64,
     /// Primitives stored.
     pub prims: u64,
-    /// Primitives counted once per instance.
+    /// Primitives counted once per instance, without those that were dropped.
     pub instanced_prims: u64,
     /// Triangles dropped because a vertex is not finite (or overflows the precision).
     pub dropped_nonfinite: u64,
@@ -307,11 +313,13 @@ impl<S: Real> World<S> {
 
     /// Counts and sizes.
     pub fn stats(&self) -> WorldStats {
+        let dropped = |placement: &Placement| self.counts[placement.object as usize].all();
+        let dropped: u64 = self.traced.placements.iter().map(dropped).sum();
         let mut stats = WorldStats {
             objects: self.assembly.objects.len() as u64,
             instances: self.assembly.placements.len() as u64,
             joined: self.names.as_ref().map_or(0, Names::joined) as u64,
-            instanced_prims: self.assembly.instanced_prims(),
+            instanced_prims: self.assembly.instanced_prims() - dropped,
             dropped_nonfinite: self.counts.iter().map(|c| c.nonfinite).sum(),
             dropped_degenerate: self.counts.iter().map(|c| c.degenerate).sum(),
             dropped_singular: self.counts.iter().map(|c| c.singular).sum(),
