@@ -114,6 +114,38 @@ fn voxels_are_inside_where_the_solid_is() {
     assert_eq!(number(&faces["euler"]), 0.0, "{faces}");
 }
 
+/// A coarse grid is what was asked for; a plate that is lost between its corners is not.
+#[test]
+fn cells_warn_of_thin_parts_only() {
+    let dir = folder();
+    let scene = "union \"ball\" { sphere radius=1 }\n\
+        union \"plate\" { box { min -1 -1 -1; max 1 1 1 }; box { min 2.99 -1 -1; max 3 1 1 } }\n";
+    std::fs::write(dir.path().join("block.kdl"), scene).expect("a scene");
+    for (solid, warned) in [("ball", false), ("plate", true)] {
+        let ended = convert(dir.path(), &format!("--solid {solid} --cells 6 -o a.stl"));
+        assert_eq!(
+            (ended.code, ended.err.contains("thinner than a cell")),
+            (Some(0), warned),
+            "{solid}: {}",
+            ended.err
+        );
+    }
+}
+
+/// Twice the same name is one solid.
+#[test]
+fn a_name_may_be_given_twice() {
+    let dir = folder();
+    let once = convert(dir.path(), "--solid block --cells 12 -o a.stl --json");
+    let twice = convert(dir.path(), "--solid block --solid block --cells 12 -o a.stl --json");
+    assert_eq!((twice.code, &twice.out), (Some(0), &once.out), "{}", twice.err);
+    refused(
+        dir.path(),
+        &"convert block.kdl --solid block --solid blok -o b.stl".split(' ').collect::<Vec<_>>(),
+        "`blok`",
+    );
+}
+
 /// Mesh and solid beside each other in one scene; the mesh is an operand too.
 #[test]
 fn a_mesh_stands_beside_its_solid() {

@@ -187,8 +187,10 @@ fn mesh(args: &ConvertArgs, kind: MeshKind, mesh: &Mesh, made: &Made, tolerance:
         distance_of_mesh: made.distances.map(|d| d.mesh),
         distance_of_solid: made.distances.map(|d| d.solid),
     };
-    if made.distances.is_some_and(|d| d.largest() > tolerance) {
-        args.output.say("warning: the distance is larger than the tolerance: some parts are thinner than a cell");
+    // Who asks for cells asks for no tolerance: a grid may be as coarse as it is, and is off by less than a cell.
+    let (limit, name) = if args.cells.is_some() { (report.spacing, "a cell") } else { (tolerance, "the tolerance") };
+    if made.distances.is_some_and(|d| d.largest() > limit) {
+        args.output.say(&format!("warning: the distance is larger than {name}: some parts are thinner than a cell"));
     }
     if args.output.json {
         return json_to_stdout(&report);

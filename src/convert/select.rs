@@ -29,11 +29,10 @@ impl Solids {
         let mut left_out = 0;
         let mut met = vec![false; names.len()];
         let mut wanted = |name: &str| {
-            let at = names.iter().position(|n| n == name);
-            if let Some(at) = at {
-                met[at] = true;
-            }
-            names.is_empty() || at.is_some()
+            // A name may be given twice.
+            let same: Vec<usize> = (0..names.len()).filter(|&i| names[i] == name).collect();
+            same.iter().for_each(|&i| met[i] = true);
+            names.is_empty() || !same.is_empty()
         };
         let whole = with_children(description, description.groups.iter().map(|g| wanted(&g.name)).collect());
         for (group, whole) in kept.groups.iter_mut().zip(whole) {
