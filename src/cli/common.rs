@@ -190,6 +190,11 @@ fn setting(text: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
+/// Parses a finite number.
+pub fn finite(text: &str) -> std::result::Result<f32, String> {
+    text.parse().ok().filter(|x: &f32| x.is_finite()).ok_or_else(|| "expected a number".into())
+}
+
 /// Threads to use.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub struct ThreadArgs {
@@ -222,6 +227,8 @@ mod tests {
     fn arguments_parse_or_say_what_is_expected() {
         assert_eq!(setting("n=3=4"), Ok(("n".into(), "3=4".into())));
         assert!(setting("n").is_err() && setting("=3").is_err());
+        assert_eq!(finite("-2.5"), Ok(-2.5));
+        assert!(["nan", "inf", "-inf", "1e99", ""].iter().all(|wrong| finite(wrong).is_err()));
     }
 
     #[test]

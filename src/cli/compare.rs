@@ -4,7 +4,7 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
-use super::common::{OutputArgs, SceneOptions, ThreadArgs, size, with_pool};
+use super::common::{OutputArgs, SceneOptions, ThreadArgs, finite, size, with_pool};
 use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
 use crate::film::exr::{Compression, ImageInfo};
@@ -308,10 +308,6 @@ impl Check {
 fn positive(text: &str) -> std::result::Result<f32, String> {
     finite(text)?;
     text.parse().ok().filter(|x| *x > 0.0).ok_or_else(|| "expected a number above 0".into())
-}
-
-fn finite(text: &str) -> std::result::Result<f32, String> {
-    text.parse().ok().filter(|x: &f32| x.is_finite()).ok_or_else(|| "expected a number".into())
 }
 
 fn density(text: &str) -> std::result::Result<f64, String> {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, SceneOptions, ThreadArgs};
+use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, SceneOptions, ThreadArgs, finite};
 use super::interrupt::stopped;
 use super::output::json_to_stdout;
 use super::picture::{target, write};
@@ -59,7 +59,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "N", default_value_t = 1)]
     spp: u32,
     /// Brightness: colours are shown times 2^STOPS
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true, value_parser = finite)]
     exposure: f32,
     #[command(flatten)]
     engine: EngineArgs,

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use indicatif::ProgressBar;
 
 use self::report::{Holds, Made, report, tell};
-use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, stop_flag, with_pool};
+use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, finite, stop_flag, with_pool};
 use super::picture::{Format, Target, files, target, write_each};
 use super::preview::{Job, PreviewArgs};
 use crate::camera::Filter;
@@ -77,10 +77,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N")]
     spp: Option<u32>,
     /// Stop adding samples after that many seconds
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time_limit: Option<f64>,
     /// Stop adding samples to a tile when its relative error is estimated below this, for example 0.02
-    #[arg(long, value_name = "ERROR")]
+    #[arg(long, value_name = "ERROR", allow_negative_numbers = true)]
     noise: Option<f64>,
     /// How samples are placed around a pixel's centre: box, tent or blackman-harris
     #[arg(long, value_name = "NAME", default_value = Filter::Box.name())]
@@ -105,7 +105,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "LIST", default_value = "")]
     aov: String,
     /// Brightness of PNG and .pix files: colours times 2^STOPS
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true, value_parser = finite)]
     exposure: f32,
     #[command(flatten)]
     engine: EngineArgs,
