@@ -22,6 +22,31 @@ fn built_in(name: &str, set: &[(&str, &str)]) -> Description {
     builtin::load(name, &set).unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// Packed scene files are what they hold, and no larger than others may be.
+#[test]
+fn scene_files_may_be_packed() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, bytes: &[u8]| {
+        let file = dir.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        load(&file.to_string_lossy(), &LoadOptions { set: vec![("r".into(), "3".into())], ..Default::default() })
+    };
+    let gzip = |bytes: &[u8]| {
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut encoder, bytes).unwrap();
+        encoder.finish().unwrap()
+    };
+    let text = b"parameter r 2\nsphere radius=\"r\"\n";
+    let plain = write("s.kdl", text).unwrap();
+    for (name, packed) in [("s.kdl.gz", gzip(text)), ("s.kdl.zst", zstd::bulk::compress(text, 3).unwrap())] {
+        let found = write(name, &packed).unwrap();
+        assert_eq!((&found.name, &found.hash), (&plain.name, &plain.hash), "{name}");
+        assert_eq!(format!("{:?}", found.groups), format!("{:?}", plain.groups), "{name}");
+    }
+    let bomb = write("bomb.kdl.gz", &gzip(&vec![b' '; (64 << 20) + 1])).unwrap_err().to_string();
+    assert!(bomb.contains("unpacks to more than 67108864 bytes"), "{bomb}");
+}
+
 #[test]
 fn files_and_built_in_scenes_are_the_same() {
     for name in builtin::NAMES {

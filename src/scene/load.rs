@@ -1,7 +1,5 @@
 //! Opening a scene by what the user typed: a file (by extension) or `builtin:NAME`.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -12,14 +10,17 @@ use super::description::{Description, Item, ItemKind};
 use super::kdl::meshes::{MeshFile, MeshFiles, add_looks, add_mesh_materials};
 use super::obj::looks::Looks;
 use super::reference::References;
+use super::unpack::UnpackLimit;
 use super::{brlcad, builtin, gltf, kdl, obj, ply, stl, unpack};
 use crate::error::{Error, Result, nearest_name};
 
-/// Extensions that [`load`] reads; all but `kdl` may also be packed (`.ply.gz`, `.glb.zst`).
+/// Extensions that [`load`] reads; files may also be packed (`.ply.gz`, `.glb.zst`).
 pub const EXTENSIONS: [&str; 8] = ["kdl", "obj", "ply", "stl", "gltf", "glb", "asc", "g"];
 
 /// Kind of our own scene files, which the built-in ones are too.
 const SCENE_FILE: &str = "kdl";
+/// A packed one is no larger than one that is not.
+const SCENE_FILE_LIMIT: UnpackLimit = UnpackLimit { floor: kdl::MAX_BYTES, ratio: 0, cap: kdl::MAX_BYTES };
 /// Kinds of BRL-CAD databases.
 const DATABASES: [&str; 2] = ["asc", "g"];
 
@@ -70,10 +71,7 @@ pub fn load_with(scene: &str, options: &LoadOptions, read: &ReadMesh<'_>) -> Res
 }
 
 fn scene_file(path: &Path, options: &LoadOptions, read: &ReadMesh<'_>) -> Result<Description> {
-    let mut bytes = Vec::new();
-    // One byte over the limit is enough for the parser to refuse the file, whatever its size.
-    let file = File::open(path).map_err(|e| Error::io(path, e))?;
-    file.take(kdl::MAX_BYTES + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, e))?;
+    let bytes = unpack::read_file_within(path, SCENE_FILE_LIMIT)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let references = References { folder: Some(folder), allow_outside: options.allow_outside };
     let read = |path: &Path| read(path, &references);
@@ -192,7 +190,7 @@ fn extension(path: &Path) -> Result<String> {
         return Ok(inner);
     }
     let all: Vec<String> = EXTENSIONS.iter().map(|e| format!(".{e}")).collect();
-    let what = format!("expected a scene ({}, all but .kdl also .gz or .zst) or builtin:NAME", all.join(" "));
+    let what = format!("expected a scene ({}, also .gz or .zst) or builtin:NAME", all.join(" "));
     let error = Error::whole(path, what);
     // Of one letter, or of none, any other letter is near.
     let near = if inner.len() > 1 { nearest_name(&inner, EXTENSIONS) } else { None };
