@@ -185,6 +185,15 @@ fn info_counts_and_measures() {
     assert!(text.contains("primitives") && text.contains("SAH cost"), "{text}");
 }
 
+/// Rays that start on surfaces, where there is none.
+#[test]
+fn explain_of_nothing_speaks_of_no_primitives() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("empty.kdl"), "").expect("a scene");
+    let said = run(&dir, "explain empty.kdl --rays ao --engine scalar --size 16x16").out;
+    assert!(said.contains("there are no rays") && !said.contains("other primitives"), "{said}");
+}
+
 /// What is dropped is counted in no instance.
 #[test]
 fn dropped_triangles_are_in_no_instance() {

@@ -199,6 +199,7 @@ fn an_edit_is_seen() {
     let broken = next();
     let error = broken["error"].as_str().expect("an error");
     assert!(error.contains("scene.kdl:2:") && error.contains("oops"), "{error}");
+    assert_eq!(broken["changed"], false, "the scene is what it was");
     assert_eq!(next()["complete"], true);
     // Put right as it was, and a picture saved beside it: the scene is the same.
     write("1.35");
@@ -223,6 +224,7 @@ fn a_parameter_is_set() {
     assert_eq!(said[3]["changed"], false);
     let error = said[4]["error"].as_str().expect("an error");
     assert!(error.contains("no parameter `hole`"), "{error}");
+    assert_eq!(said[4]["changed"], false, "the scene is what it was");
     let want = render(dir.path(), "builtin:bolt --size 60x50 --set hole.radius=6");
     for name in ["seen.exr", "kept.exr"] {
         assert!(exr::read(&dir.path().join(name)).unwrap() == want, "{name}");

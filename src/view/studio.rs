@@ -186,7 +186,7 @@ impl Studio<'_> {
                 Ok(None) => continue,
                 Ok(Some(stage)) => stage,
                 Err(error) => {
-                    return Ok(json!({ "command": command, "changed": true, "error": error.to_string() }));
+                    return Ok(json!({ "command": command, "changed": false, "error": error.to_string() }));
                 }
             };
             self.stage = stage;

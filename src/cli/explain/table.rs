@@ -101,6 +101,7 @@ fn engine(work: &Work) -> String {
                  {measured_ns_per_ray:.1} ns: {percent:.0} % of the limit"
             );
         }
+        None if work.rays == 0 => text.push_str("  limit: none, there are no rays\n"),
         None => text.push_str("  limit: not known, there are other primitives than triangles\n"),
     }
     if let Some(s) = &work.shares {
