@@ -87,6 +87,23 @@ fn limits_decide_the_exit_code() {
     }
 }
 
+/// Samples without a number are left out of the errors, so a picture of nothing else has none, and FLIP takes NaN for black and
+/// infinity for white: no limit is kept by that.
+#[test]
+fn what_is_not_finite_keeps_no_limit() {
+    let dir = folder();
+    for (reference, name, value) in [("black.exr", "nan.exr", f32::NAN), ("white.exr", "infinite.exr", f32::INFINITY)] {
+        gray(dir.path(), reference, if value.is_nan() { 0.0 } else { 1.0 });
+        gray(dir.path(), name, value);
+        for limit in ["max-rmse 9", "max-relmse 9", "min-psnr 0", "min-ssim 0", "max-flip 1", "max-hdr-flip 1"] {
+            let ended = run(&dir, &format!("compare {reference} {name} --{limit} --json"), 1);
+            assert!(ended.json()["pass"] == false && ended.json()["not_finite"] == 576, "{limit}: {}", ended.out);
+            assert!(ended.err.contains("576 samples are finite in one file only"), "{limit}: {}", ended.err);
+        }
+        run(&dir, &format!("compare {name} {name} --max-rmse 0 --min-psnr 100"), 0);
+    }
+}
+
 #[test]
 fn what_does_not_compare_is_refused() {
     let dir = folder();

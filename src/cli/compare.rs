@@ -27,6 +27,7 @@ the colours are of display values (0 to 1) if a file holds 8-bit levels, else of
 that are the same, one step apart, or farther; steps are 8-bit levels, or representable floats (ulp).
 Hits: files that `trace --hits` wrote. With --scene and --rays, the f64 oracle judges both answers of every ray \
 whose bits differ; a mismatch is explained if the geometry is within a few roundings of the answer.
+A sample that is not finite (NaN, infinite) in one file only is beyond every limit on a figure of the colours.
 Exit code 1: a limit given here is passed, a mismatch of hits is not explained, or sizes differ.";
 
 /// Arguments of `lanecast compare`.
@@ -244,8 +245,8 @@ impl Limits {
         check.most("samples beyond", self.max_beyond.map(|n| n as f64), Some(classes.beyond as f64));
         let different = classes.beyond + classes.within_one;
         check.most("different samples", self.max_different.map(|n| n as f64), Some(different as f64));
-        let broken = colors.filter(|c| c.not_finite > 0 && (self.max_rmse.is_some() || self.max_relmse.is_some()));
-        if let Some(c) = broken {
+        // The errors leave such samples out, and FLIP takes them for black or white.
+        if let Some(c) = colors.filter(|c| c.not_finite > 0 && self.any_of_figures()) {
             check.failures.push(format!("{} samples are finite in one file only", c.not_finite));
         }
         check.done()
@@ -253,8 +254,7 @@ impl Limits {
 
     /// What of `report` is beyond a limit, and mismatches that nothing explains.
     fn of_hits(&self, report: &HitReport) -> Result<Vec<String>> {
-        let figures = [self.max_rmse, self.max_relmse, self.min_psnr, self.min_ssim, self.max_flip, self.max_hdr_flip];
-        if figures.iter().any(Option::is_some) || self.max_ulp.is_some() {
+        if self.any_of_figures() || self.max_ulp.is_some() {
             return Err(Error::Usage("hits have the limits --max-beyond and --max-different only".into()));
         }
         let mut check = Check::default();
@@ -266,6 +266,12 @@ impl Limits {
             check.failures.push(format!("{} answers are not explained", judged.unexplained));
         }
         check.done()
+    }
+
+    /// Whether a figure of the colours has a limit.
+    fn any_of_figures(&self) -> bool {
+        let figures = [self.max_rmse, self.max_relmse, self.min_psnr, self.min_ssim, self.max_flip, self.max_hdr_flip];
+        figures.iter().any(Option::is_some)
     }
 }
 
