@@ -104,6 +104,31 @@ fn what_is_not_finite_keeps_no_limit() {
     }
 }
 
+/// Limits on samples are of every sample: a plane without a counterpart breaks them, and without any pair there is nothing to say.
+/// Levels are of colours, whatever else one file holds.
+#[test]
+fn planes_of_one_file_break_the_limits_on_samples() {
+    let dir = folder();
+    let mut film = exr::read(&dir.path().join("half.exr")).expect("an EXR");
+    film.push("Z", PlaneData::F32(vec![1.0; 192])).expect("a plane");
+    let info = exr::ImageInfo::default();
+    exr::write(&dir.path().join("deep.exr"), &film, &info, exr::Compression::Zip).expect("written");
+    npy::write_plane(&dir.path().join("gray.npy"), 16, 12, &PlaneData::F32(vec![0.5; 192])).expect("written");
+    for limit in ["--max-different 0", "--max-beyond 0", "--max-ulp 0"] {
+        for files in ["half.exr deep.exr", "deep.exr half.exr"] {
+            let ended = run(&dir, &format!("compare {files} {limit} --json"), 1);
+            assert_eq!(ended.json()["pass"], false, "{files} {limit}");
+            assert!(ended.err.contains("in one file only, or of another type: Z"), "{}", ended.err);
+        }
+        let line = format!("compare gray.npy half.exr {limit}");
+        refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), "no sample");
+    }
+    run(&dir, "compare deep.exr deep.exr --max-different 0 --max-ulp 0", 0);
+    run(&dir, "compare half.exr deep.exr --max-rmse 0", 0);
+    run(&dir, "compare gray.npy half.exr --max-rmse 0", 0);
+    run(&dir, "compare half.png deep.exr --max-different 0", 0);
+}
+
 #[test]
 fn what_does_not_compare_is_refused() {
     let dir = folder();

@@ -28,6 +28,8 @@ that are the same, one step apart, or farther; steps are 8-bit levels, or repres
 Hits: files that `trace --hits` wrote. With --scene and --rays, the f64 oracle judges both answers of every ray \
 whose bits differ; a mismatch is explained if the geometry is within a few roundings of the answer.
 A sample that is not finite (NaN, infinite) in one file only is beyond every limit on a figure of the colours.
+Limits on single samples (ulp, beyond, different) are of all planes of both files: a plane that only one has breaks them. \
+Samples that are 8-bit levels are of the colours only.
 Exit code 1: a limit given here is passed, a mismatch of hits is not explained, or sizes differ.";
 
 /// Arguments of `lanecast compare`.
@@ -240,6 +242,7 @@ impl Limits {
         check.least("SSIM", self.min_ssim, colors.and_then(|c| c.ssim));
         check.most("FLIP", self.max_flip, colors.map(|c| c.flip));
         check.most("HDR-FLIP", self.max_hdr_flip, colors.and_then(|c| c.hdr_flip));
+        self.check_planes(report, &mut check)?;
         check.most("ulp", self.max_ulp.map(|n| n as f64), report.max_ulp.map(|n| n as f64));
         let classes = report.classes;
         check.most("samples beyond", self.max_beyond.map(|n| n as f64), Some(classes.beyond as f64));
@@ -266,6 +269,27 @@ impl Limits {
             check.failures.push(format!("{} answers are not explained", judged.unexplained));
         }
         check.done()
+    }
+
+    /// Limits on single samples are of all planes, so one that has nothing to be compared with breaks them. (Levels are of the
+    /// colours alone, which then both files have.)
+    ///
+    /// # Errors
+    /// A limit, and no sample to compare.
+    fn check_planes(&self, report: &PictureReport, check: &mut Check) -> Result<()> {
+        let limits = [self.max_ulp, self.max_beyond, self.max_different];
+        if report.unit == "level" || limits.iter().all(Option::is_none) {
+            return Ok(());
+        }
+        let lonely = report.unmatched.join(", ");
+        if report.planes.is_empty() {
+            let what = format!("no plane is in both files with the same type, so no sample can be compared: {lonely}");
+            return Err(Error::Usage(what));
+        }
+        if !lonely.is_empty() {
+            check.failures.push(format!("planes in one file only, or of another type: {lonely}"));
+        }
+        Ok(())
     }
 
     /// Whether a figure of the colours has a limit.
