@@ -53,6 +53,8 @@ fn pictures_have_figures_classes_and_maps() {
 
     let near = run(&dir, "compare half.exr near.exr --json", 0).json();
     assert_eq!((near["classes"]["within_one"].as_u64(), near["max_ulp"].as_u64()), (Some(576), Some(1)));
+    gray(dir.path(), "black.exr", 0.0);
+    run(&dir, "compare black.exr black.exr --min-psnr 40 --min-ssim 0.9", 0);
     let text = run(&dir, "compare half.png half.exr", 0).out;
     assert!(text.contains("576 matching (100.0000 %)") && text.contains("PSNR       inf dB"), "{text}");
 }

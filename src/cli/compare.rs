@@ -52,7 +52,7 @@ pub struct CompareArgs {
     /// Stops by which linear light is brightened for 8-bit levels and LDR-FLIP
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true, value_parser = finite)]
     exposure: f32,
-    /// White of PSNR and SSIM [default: 1 for levels, else the largest value of the reference]
+    /// White of PSNR and SSIM [default: 1 for levels, else the largest value of the reference, or 1 if that is black]
     #[arg(long, value_name = "X", value_parser = positive)]
     peak: Option<f32>,
     /// Size of .pix pictures that are not square

@@ -15,7 +15,8 @@ use crate::film::{Film, PlaneData, srgb};
 pub struct Options {
     /// Stops by which linear light is brightened before it becomes display levels.
     pub exposure: f32,
-    /// The value that PSNR and SSIM take for white; `None`: 1 for display levels, else the largest of the reference.
+    /// The value that PSNR and SSIM take for white; `None`: 1 for display levels, else the largest of the reference, or 1
+    /// if nothing of that is above 0.
     pub peak: Option<f64>,
     /// How FLIP looks at them.
     pub viewing: Viewing,
@@ -211,7 +212,9 @@ fn colored(
         }
     }
     let largest = || va.planes.into_iter().flatten().filter(|x| x.is_finite()).fold(0.0f32, |most, x| most.max(*x));
-    let peak = options.peak.unwrap_or_else(|| if domain == Domain::Display { 1.0 } else { largest().into() });
+    // A black reference has no white of its own.
+    let brightest = || Some(largest()).filter(|&x| x > 0.0).unwrap_or(1.0);
+    let peak = options.peak.unwrap_or_else(|| if domain == Domain::Display { 1.0 } else { brightest().into() });
     let errors = sums.errors();
     let colors = Colors {
         domain,
@@ -293,6 +296,18 @@ mod tests {
         let film = difference_film(&a, &b, Some(&maps)).unwrap();
         assert_eq!((film.f32_plane("R").unwrap()[0], film.f32_plane("diff.Z").unwrap()[0]), (-0.25, 2.0));
         assert!(film.f32_plane("hdr_flip").is_some());
+    }
+
+    /// White is 1 where the reference is black: equal pictures are equal, and 0.5 is off by 10 log10(1 / 0.25) = 6.02 dB; SSIM of
+    /// flat 0 and 0.5 is C1 / (0.25 + C1) with C1 = 1e-4.
+    #[test]
+    fn a_black_reference_compares() {
+        let [black, gray] = [0.0, 0.5].map(|value| picture(Encoding::Linear, value, 1.0));
+        let colors = |b: &Picture| compare(&black, b, &Options::default()).unwrap().0.colors.unwrap();
+        let (same, other) = (colors(&black), colors(&gray));
+        assert_eq!((same.psnr, same.ssim, same.peak), (f64::INFINITY, Some(1.0), 1.0));
+        assert!((other.psnr - 6.0206).abs() < 1e-4, "{other:?}");
+        assert!((other.ssim.unwrap() - 1e-4 / 0.2501).abs() < 1e-9, "{other:?}");
     }
 
     #[test]

@@ -51,8 +51,11 @@ impl Rgb<'_> {
     }
 }
 
-/// Peak signal-to-noise ratio in decibels: 10 log10(`peak`^2 / mean squared error); infinite for equal pictures.
+/// Peak signal-to-noise ratio in decibels: 10 log10(`peak`^2 / mean squared error); infinite for equal pictures, whatever the peak.
 pub fn psnr(mean_squared_error: f64, peak: f64) -> f64 {
+    if mean_squared_error == 0.0 {
+        return f64::INFINITY;
+    }
     10.0 * (peak * peak / mean_squared_error).log10()
 }
 
@@ -66,7 +69,7 @@ mod tests {
         assert!((psnr(0.01, 1.0) - 20.0).abs() < 1e-12);
         assert!((psnr(0.0025, 1.0) - 26.020_599_913).abs() < 1e-8);
         assert!((psnr(25.5f64.powi(2), 255.0) - 20.0).abs() < 1e-12);
-        assert_eq!(psnr(0.0, 1.0), f64::INFINITY);
+        assert_eq!([psnr(0.0, 1.0), psnr(0.0, 0.0)], [f64::INFINITY; 2]);
     }
 
     #[test]
