@@ -100,13 +100,10 @@ pub struct Maps {
 /// Compares `b` with the reference `a`; maps only if both have colours.
 ///
 /// # Errors
-/// [`Error::Mismatch`] for pictures of different sizes.
+/// [`Error::Mismatch`] for pictures of different sizes, and for different parts of what is one picture by its size.
 pub fn compare(a: &Picture, b: &Picture, options: &Options) -> Result<(PictureReport, Option<Maps>)> {
-    let size = |p: &Picture| (p.film.window.width(), p.film.window.height());
-    if size(a) != size(b) {
-        let ((aw, ah), (bw, bh)) = (size(a), size(b));
-        return Err(Error::Mismatch(format!("pictures of different sizes: {aw}x{ah} and {bw}x{bh}")));
-    }
+    check_aligned(a, b)?;
+    let (width, height) = (a.film.window.width(), a.film.window.height());
     let (planes, unmatched) = planes(&a.film, &b.film);
     let colors = a.rgb().zip(b.rgb());
     let any = |encoding| [a, b].iter().any(|p| p.encoding == encoding);
@@ -136,8 +133,8 @@ pub fn compare(a: &Picture, b: &Picture, options: &Options) -> Result<(PictureRe
         classes.beyond += plane.classes.beyond;
     }
     let report = PictureReport {
-        width: size(a).0,
-        height: size(a).1,
+        width,
+        height,
         colors: report,
         classes: by_level.unwrap_or(classes),
         unit: if by_level.is_some() { "level" } else { "ulp" },
@@ -147,6 +144,23 @@ pub fn compare(a: &Picture, b: &Picture, options: &Options) -> Result<(PictureRe
         unmatched,
     };
     Ok((report, maps))
+}
+
+/// Checks that the same sample of both pictures is the same pixel, as far as the files say.
+fn check_aligned(a: &Picture, b: &Picture) -> Result<()> {
+    let size = |p: &Picture| (p.film.window.width(), p.film.window.height());
+    if size(a) != size(b) {
+        let ((aw, ah), (bw, bh)) = (size(a), size(b));
+        return Err(Error::Mismatch(format!("pictures of different sizes: {aw}x{ah} and {bw}x{bh}")));
+    }
+    let whole = |p: &Picture| (p.film.width, p.film.height);
+    if whole(a) == whole(b) && a.film.window != b.film.window {
+        let corner = |p: &Picture| format!("({}, {})", p.film.window.x0, p.film.window.y0);
+        let ((width, height), [at, other]) = (whole(a), [corner(a), corner(b)]);
+        let what = format!("different parts of a picture of {width}x{height}: they begin at {at} and {other}");
+        return Err(Error::Mismatch(what));
+    }
+    Ok(())
 }
 
 /// All planes of both films: those that compare, and the names of those that do not.
@@ -270,6 +284,7 @@ pub fn difference_film(a: &Picture, b: &Picture, maps: Option<&Maps>) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Window;
 
     fn picture(encoding: Encoding, value: f32, z: f32) -> Picture {
         let mut film = Film::full(12, 12).unwrap();
@@ -332,5 +347,23 @@ mod tests {
         assert_eq!(compare(&a, &b, &Options::default()).unwrap().0.unmatched, ["id.instance"]);
         let small = Picture { film: Film::full(3, 3).unwrap(), encoding: Encoding::Linear };
         assert_eq!(compare(&a, &small, &Options::default()).unwrap_err().exit_code(), 1);
+    }
+
+    /// Windows of 12x12 pixels of 40x30; a file that knows no windows is compared with either as it is.
+    #[test]
+    fn parts_of_one_picture_must_be_the_same_part() {
+        let crop = |x0, y0| {
+            let mut part = picture(Encoding::Linear, 0.5, 1.0);
+            (part.film.width, part.film.height) = (40, 30);
+            part.film.window = Window { x0, y0, x1: x0 + 12, y1: y0 + 12 };
+            part
+        };
+        let [part, same, beside] = [crop(3, 4), crop(3, 4), crop(4, 4)];
+        let compared = |a: &Picture, b: &Picture| compare(a, b, &Options::default());
+        let refused = compared(&part, &beside).unwrap_err();
+        assert!(refused.exit_code() == 1 && refused.to_string().contains("(3, 4) and (4, 4)"), "{refused}");
+        for other in [&same, &picture(Encoding::Levels, 0.5, 1.0), &picture(Encoding::Linear, 0.5, 1.0)] {
+            assert_eq!(compared(&part, other).unwrap().0.colors.unwrap().rmse, 0.0);
+        }
     }
 }
