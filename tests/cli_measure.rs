@@ -349,9 +349,9 @@ fn two_runs_are_compared() {
 fn programs_take_turns_and_are_compared() {
     let dir = square();
     let own = env!("CARGO_BIN_EXE_lanecast");
-    let words =
-        "bench square.ply --rays primary --engines scalar,packet4 --size 32x32 --repeat 3 --threads 1 --turns 3";
-    let changes = run(&dir, &format!("{words} --against {own} -o turns --json")).json();
+    let words = "bench --rays primary --engines scalar,packet4 --size 32x32 --repeat 3 --threads 1 --turns 3";
+    let words = format!("{words} --against {own} -qv -o turns --json -- square.ply");
+    let changes = run(&dir, &words).json();
     let rows = changes.as_array().expect("rows");
     assert!(rows.len() == 2 && rows.iter().all(|row| row["basis"] == "turns" && row["interval"]["low"].is_number()));
     for side in ["old", "new"] {
@@ -360,6 +360,11 @@ fn programs_take_turns_and_are_compared() {
     let again = run(&dir, "bench --compare turns/old turns/new").out;
     assert!(again.contains("2 rows compared"), "{again}");
     binary::refused(dir.path(), &["bench", "--against", "nowhere/lanecast"], "nowhere/lanecast");
+    binary::refused(dir.path(), &words.split(' ').collect::<Vec<_>>(), "earlier run");
+    for (bad, what) in [("bench none.ply", "none.ply"), ("bench square.ply --engines scaler", "scalar")] {
+        let line = format!("{bad} --against {own} -o bad");
+        binary::refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);
+    }
 }
 
 #[test]

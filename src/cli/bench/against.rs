@@ -13,10 +13,16 @@ use crate::measure::compare::{self, Change};
 /// `folder/old/NN` and `folder/new/NN`.
 ///
 /// # Errors
-/// [`Error::Io`] if a program cannot be run, [`Error::Mismatch`] if one fails; [`Error::Interrupted`].
+/// [`Error::Usage`] if `folder` holds turns already or a program refuses the words; [`Error::Io`] if a program cannot be run,
+/// [`Error::Mismatch`] if one fails; [`Error::Interrupted`].
 pub fn run(other: &Path, turns: u32, folder: &Path, output: &OutputArgs) -> Result<Vec<Change>> {
     let own = std::env::current_exe().map_err(|e| Error::io("the running program", e))?;
     let words = common_words(std::env::args_os().skip(2));
+    // Turns of an earlier run would be compared as if they were of this one.
+    if let Some(side) = ["old", "new"].map(|side| folder.join(side)).iter().find(|side| side.exists()) {
+        let what = format!("{} is there already, of an earlier run; give another folder with -o", side.display());
+        return Err(Error::Usage(what));
+    }
     let bar = output.progress_bar(u64::from(2 * turns), "taking turns");
     for turn in 1..=turns {
         for (program, side) in [(other, "old"), (own.as_path(), "new")] {
@@ -33,39 +39,52 @@ pub fn run(other: &Path, turns: u32, folder: &Path, output: &OutputArgs) -> Resu
 }
 
 fn one(program: &Path, words: &[OsString], folder: &Path) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
     let mut command = Command::new(program);
-    command.arg("bench").args(words).arg("-o").arg(folder).arg("--quiet").stdout(Stdio::null());
+    // Own options first: after a `--` among the words they would be scenes.
+    command.arg("bench").arg("--quiet").arg("-o").arg(folder).args(words).stdout(Stdio::null());
     let status = command.status().map_err(|e| Error::io(program, e))?;
     // A row with wrong hits (exit code 1) has no figure; the others still compare.
     match status.code() {
         Some(0 | 1) => Ok(()),
+        Some(2) => Err(Error::Usage(format!("{} bench: bad usage or input", program.display()))),
         Some(130) => Err(Error::Interrupted),
         _ => Err(Error::Mismatch(format!("{} bench: {status}", program.display()))),
     }
 }
 
 /// The words of a command line without those that only concern taking turns and reporting.
-fn common_words(words: impl Iterator<Item = OsString>) -> Vec<OsString> {
-    const WITH_VALUE: [&str; 4] = ["--against", "--turns", "-o", "--output"];
-    const ALONE: [&str; 5] = ["--json", "-q", "--quiet", "-v", "--verbose"];
-    let (mut kept, mut skip) = (Vec::new(), false);
-    for word in words {
-        let text = word.to_string_lossy();
-        let value_inside = WITH_VALUE.iter().any(|name| {
-            let rest = text.strip_prefix(name);
-            rest.is_some_and(|rest| rest.starts_with('=') || name.len() == 2 && !rest.is_empty())
-        });
-        if std::mem::take(&mut skip) || value_inside || ALONE.contains(&&*text) {
-            continue;
+fn common_words(mut words: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut kept = Vec::new();
+    while let Some(word) = words.next() {
+        if word == "--" {
+            // What follows are scenes, whatever they look like.
+            kept.push(word);
+            kept.extend(words.by_ref());
+            break;
         }
-        if WITH_VALUE.contains(&&*text) {
-            skip = true;
-            continue;
+        match is_about_turns(&word.to_string_lossy()) {
+            None => kept.push(word),
+            Some(false) => {}
+            Some(true) => drop(words.next()),
         }
-        kept.push(word);
     }
     kept
+}
+
+/// If `word` only concerns taking turns and reporting: whether the next word is its value.
+fn is_about_turns(word: &str) -> Option<bool> {
+    const WITH_VALUE: [&str; 3] = ["--against", "--turns", "--output"];
+    const ALONE: [&str; 3] = ["--json", "--quiet", "--verbose"];
+    if let Some(letters) = word.strip_prefix('-').filter(|rest| !rest.starts_with('-')) {
+        // Letters may stand together, the last with its value: -qv, -qofolder.
+        let rest = letters.trim_start_matches(['q', 'v']);
+        return match rest.strip_prefix('o') {
+            Some(value) => Some(value.is_empty()),
+            None => (rest.is_empty() && !letters.is_empty()).then_some(false),
+        };
+    }
+    let (name, has_value) = word.split_once('=').map_or((word, false), |(name, _)| (name, true));
+    if WITH_VALUE.contains(&name) { Some(!has_value) } else { ALONE.contains(&word).then_some(false) }
 }
 
 /// A folder for rows that nobody asked to keep.
@@ -84,8 +103,11 @@ mod tests {
 
     #[test]
     fn only_what_is_measured_is_passed_on() {
+        let kept = |line: &str| common_words(line.split(' ').map(OsString::from));
         let line = "model.ply --against old --rays=primary -o out --turns=3 -oout --output=out --json --size 8x8 -v";
-        let kept = common_words(line.split(' ').map(OsString::from));
-        assert_eq!(kept, ["model.ply", "--rays=primary", "--size", "8x8"]);
+        assert_eq!(kept(line), ["model.ply", "--rays=primary", "--size", "8x8"]);
+        let letters = "-qv --eye -1,0,0 -qo out -vqoout -vv --fov 40";
+        assert_eq!(kept(letters), ["--eye", "-1,0,0", "--fov", "40"]);
+        assert_eq!(kept("-q -- -q --json"), ["--", "-q", "--json"], "names of scenes");
     }
 }
