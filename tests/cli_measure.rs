@@ -325,13 +325,17 @@ fn two_runs_are_compared() {
     let text = run(&dir, "bench --compare old new/bench.csv").out;
     assert!(text.contains("square") && text.contains("tile") && text.contains("scalar"), "{text}");
     let same = run(&dir, "bench --compare old old --json").json();
-    let rows = same.as_array().expect("rows");
-    assert_eq!(rows.len(), 2);
+    let rows = same["rows"].as_array().expect("rows");
+    assert_eq!((rows.len(), &same["compared"]), (2, &serde_json::json!(2)));
+    assert!(["faster", "slower", "only_old", "only_new"].iter().all(|count| same[count] == 0), "{same}");
     assert!(rows.iter().all(|row| row["verdict"] == "no difference seen" && row["factor"] == 1.0), "{same}");
     let csv = std::fs::read_to_string(dir.path().join("old/bench.csv")).expect("rows");
     let header = csv.lines().next().expect("a header");
     assert!(header.ends_with(",seconds") && csv.lines().nth(1).expect("a row").split(' ').count() >= 3, "{csv}");
     binary::refused(dir.path(), &["bench", "--compare", "old", "nowhere"], "nowhere");
+    let other = csv.replace(",primary,", ",ao,");
+    std::fs::write(dir.path().join("other.csv"), other).expect("a file");
+    binary::refused(dir.path(), &["bench", "--compare", "old", "other.csv"], "only old: 2, only new: 2");
     // Rows of versions without single passes still compare.
     let committed = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("results/amd-epyc-avx512");
     let [older, newer] = ["2026-11-21-c2763bb", "2026-11-21-c32b661"].map(|run| committed.join(run).join("sponza"));
@@ -352,7 +356,7 @@ fn programs_take_turns_and_are_compared() {
     let words = "bench --rays primary --engines scalar,packet4 --size 32x32 --repeat 3 --threads 1 --turns 3";
     let words = format!("{words} --against {own} -qv -o turns --json -- square.ply");
     let changes = run(&dir, &words).json();
-    let rows = changes.as_array().expect("rows");
+    let rows = changes["rows"].as_array().expect("rows");
     assert!(rows.len() == 2 && rows.iter().all(|row| row["basis"] == "turns" && row["interval"]["low"].is_number()));
     for side in ["old", "new"] {
         assert_eq!(files(&dir.path().join("turns").join(side)), ["001", "002", "003"], "{side}");

@@ -13,7 +13,7 @@ use super::render::{self, RenderArgs};
 use crate::error::{Error, Result};
 use crate::film::{check_folder, write_atomically};
 use crate::measure::bench::{self, Plan};
-use crate::measure::compare;
+use crate::measure::compare::{self, Change, Comparison};
 use crate::measure::env;
 use crate::measure::explain::Ports;
 use crate::measure::history;
@@ -137,8 +137,7 @@ struct Report<'a> {
 /// is printed and written.
 pub fn run(args: &BenchArgs) -> Result<()> {
     if let [old, new] = &args.compare[..] {
-        let changes = compare::compare(&compare::read(old)?, &compare::read(new)?);
-        return if args.output.json { json_to_stdout(&changes) } else { to_stdout(&compare::table(&changes)) };
+        return tell(compare::compare(&compare::read(old)?, &compare::read(new)?), &args.output);
     }
     if let Some(file) = &args.experiment {
         experiment::run(file, args.folder.as_deref(), args.embree.as_deref(), &args.output)?;
@@ -148,7 +147,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     if let Some(other) = &args.against {
         let (_dropped_at_the_end, temporary) = against::temporary()?;
         let changes = against::run(other, args.turns, args.folder.as_ref().unwrap_or(&temporary), &args.output)?;
-        return if args.output.json { json_to_stdout(&changes) } else { to_stdout(&compare::table(&changes)) };
+        return tell(changes, &args.output);
     }
     if args.record.is_some() {
         history::check_revision(env::REVISION, args.dirty)?;
@@ -196,6 +195,12 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         return Err(Error::Mismatch(format!("bench: {wrong} of {} rows have wrong hits", rows.len())));
     }
     Ok(())
+}
+
+/// Says what moved.
+fn tell(changes: Vec<Change>, output: &OutputArgs) -> Result<()> {
+    let comparison = Comparison::of(changes)?;
+    if output.json { json_to_stdout(&comparison) } else { to_stdout(&compare::table(&comparison)) }
 }
 
 /// Says what a core does in a cycle.

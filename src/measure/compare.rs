@@ -14,6 +14,7 @@ mod read;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
+use crate::error::{Error, Result};
 use crate::measure::intervals::{Estimate, Interval, ratio_of_medians, ratio_over_turns};
 pub use read::{Figure, Key, Turn, read};
 
@@ -61,6 +62,41 @@ pub struct Change {
     pub verdict: &'static str,
 }
 
+/// All rows of either side, and how many of them say what.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Comparison {
+    /// Rows that both sides have.
+    pub compared: usize,
+    /// Of these: faster.
+    pub faster: usize,
+    /// Of these: slower.
+    pub slower: usize,
+    /// Rows of the old side alone.
+    pub only_old: usize,
+    /// Rows of the new side alone.
+    pub only_new: usize,
+    /// The rows.
+    pub rows: Vec<Change>,
+}
+
+impl Comparison {
+    /// Counts `rows`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if no row is on both sides.
+    pub fn of(rows: Vec<Change>) -> Result<Self> {
+        let count = |is_one: fn(&Change) -> bool| rows.iter().filter(|row| is_one(row)).count();
+        let compared = count(|row| row.old.is_some() && row.new.is_some());
+        let [only_old, only_new] = [count(|row| row.new.is_none()), count(|row| row.old.is_none())];
+        if compared == 0 {
+            let what = "nothing to compare: no row of the same scene, rays, engine and threads is on both sides";
+            return Err(Error::Usage(format!("{what} (only old: {only_old}, only new: {only_new})")));
+        }
+        let [faster, slower] = [count(|row| row.verdict == "faster"), count(|row| row.verdict == "slower")];
+        Ok(Self { compared, faster, slower, only_old, only_new, rows })
+    }
+}
+
 /// Every row of either side.
 pub fn compare(old: &[Turn], new: &[Turn]) -> Vec<Change> {
     let keys: BTreeSet<&Key> = old.iter().chain(new).flat_map(|turn| turn.figures.keys()).collect();
@@ -100,15 +136,16 @@ fn change(key: &Key, old: &[Figure], new: &[Figure], turns: bool) -> Change {
     }
     // `scalar` itself has the ratio 1 in every run: only its rate can tell.
     let ratios = change.engine != "scalar";
-    let (estimate, margin, basis) = match (turns, ratios) {
-        (true, _) => {
+    let passes = old.iter().chain(new).all(|f| !f.rates.is_empty());
+    let (estimate, margin, basis) = match turns && passes {
+        true => {
             let every = |side: &[Figure]| side.iter().all(|f| !f.ratios.is_empty());
             let by_ratio = ratios && every(old) && every(new);
             let samples = |f: &Figure| if by_ratio { f.ratios.clone() } else { f.rates.clone() };
             let pairs: Vec<_> = new.iter().zip(old).map(|(n, o)| (samples(n), samples(o))).collect();
             (ratio_over_turns(&pairs), MARGIN, "turns")
         }
-        _ => single(pooled(old), pooled(new), ratios),
+        false => single(pooled(old), pooled(new), ratios),
     };
     if let Some(Estimate { value, interval }) = estimate {
         change.verdict = interval.verdict(margin).name();
@@ -142,8 +179,9 @@ fn single(old: Figure, new: Figure, may_use_ratios: bool) -> (Option<Estimate>, 
     (Some(Estimate { value, interval: Interval { low: value / noise, high: value * noise } }), margin, basis)
 }
 
-/// The changes for people.
-pub fn table(changes: &[Change]) -> String {
+/// The comparison for people.
+pub fn table(comparison: &Comparison) -> String {
+    let changes = &comparison.rows;
     let number = |x: Option<f64>| x.map_or("-".into(), |x| format!("{x:.2}"));
     let width = changes.iter().map(|c| c.engine.len()).max().unwrap_or(0).max(6);
     let mut text = String::new();
@@ -172,16 +210,20 @@ pub fn table(changes: &[Change]) -> String {
             c.verdict
         );
     }
-    let faster = changes.iter().filter(|c| c.verdict == "faster").count();
-    let slower = changes.iter().filter(|c| c.verdict == "slower").count();
-    let _infallible = writeln!(
-        text,
-        "{} rows compared: {faster} faster, {slower} slower{}",
-        changes.len(),
-        if faster + slower == 0 { "; no difference seen" } else { "" }
-    );
+    text.push_str(&summary(comparison));
     text.push_str(LEGEND);
     text
+}
+
+/// The line of counts.
+fn summary(comparison: &Comparison) -> String {
+    let Comparison { compared, faster, slower, only_old, only_new, .. } = *comparison;
+    let nothing = if faster + slower == 0 { "; no difference seen" } else { "" };
+    let left_out = [(only_old, "old"), (only_new, "new")].map(|(count, side)| match count {
+        0 => String::new(),
+        _ => format!("; {count} only {side}"),
+    });
+    format!("{compared} rows compared: {faster} faster, {slower} slower{nothing}{}\n", left_out.concat())
 }
 
 const LEGEND: &str = "old, new: million rays per second, median; factor: new over old, of the ratios to `scalar` of the same rounds where\n\

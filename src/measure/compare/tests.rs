@@ -2,7 +2,6 @@ use std::path::Path;
 
 use super::*;
 use crate::camera::sampling::pcg4d;
-use crate::error::Result;
 
 const HEADER: &str = "threads,scene,scene_hash,class,query,engine,precision,rays,status,repeat,median_mrays_per_s,\
     mad_seconds,ratio_to_scalar,peer_mode";
@@ -50,8 +49,30 @@ fn what_moved_and_what_did_not() {
     let verdict = |engine: &str| find(&changes, engine).verdict;
     assert_eq!((verdict("tile"), find(&changes, "tile").factor), ("faster", Some(1.1)));
     assert_eq!((verdict("scalar"), verdict("gone"), verdict("packet")), ("slower", "only old", "only new"));
-    let text = table(&changes);
-    assert!(text.contains("1.100    1.100 to 1.100     2 %  faster") && text.contains("1 faster, 1 slower"), "{text}");
+    let text = table(&Comparison::of(changes).unwrap());
+    assert!(text.contains("1.100    1.100 to 1.100     2 %  faster"), "{text}");
+    assert!(text.contains("\n2 rows compared: 1 faster, 1 slower; 1 only old; 1 only new\n"), "{text}");
+}
+
+/// Runs that took turns with a program that keeps no passes have medians, and these compare.
+#[test]
+fn turns_without_passes_compare() {
+    let header = format!("{HEADER},date\n");
+    let turn = |date: u32, mrays: f64| {
+        let text = format!("{header}{},{date}\n", row("tile", mrays, 0.0, "").trim_end());
+        read::parse(Path::new("a.csv"), text.as_bytes()).unwrap()
+    };
+    let [old, new] = [(0, 10.0), (1, 20.0)].map(|(at, mrays)| [0, 2, 4].map(|i| turn(i + at, mrays)));
+    let change = &compare(&old, &new)[0];
+    assert_eq!((change.verdict, change.factor, change.basis), ("faster", Some(2.0), Some("rates")));
+}
+
+#[test]
+fn runs_without_a_common_row_are_refused() {
+    let [old, new] = ["tile", "packet4"].map(|engine| [parsed(&row(engine, 1.0, 0.0, "1")).unwrap()]);
+    let refused = Comparison::of(compare(&old, &new)).unwrap_err();
+    assert_eq!(refused.exit_code(), 2);
+    assert!(refused.to_string().contains("only old: 1, only new: 1"), "{refused}");
 }
 
 #[test]
@@ -59,8 +80,8 @@ fn noise_is_no_difference() {
     let old = [parsed(&row("tile", 20.0, 0.002, "10")).unwrap()];
     let new = [parsed(&row("tile", 21.0, 0.002, "10.5")).unwrap()];
     assert_eq!(compare(&old, &new)[0].verdict, "no difference seen");
-    let same = compare(&old, &old);
-    assert_eq!((same[0].verdict, same[0].factor), ("no difference seen", Some(1.0)));
+    let same = Comparison::of(compare(&old, &old)).unwrap();
+    assert_eq!((same.rows[0].verdict, same.rows[0].factor), ("no difference seen", Some(1.0)));
     assert!(table(&same).contains("no difference seen\n1 rows"), "{}", table(&same));
 }
 
