@@ -450,6 +450,10 @@ fn experiments_resume_where_they_were() {
         "{}",
         again.err
     );
+    let report = run(&dir, "bench --experiment tiny.kdl -o out --json").json();
+    let numbers = ["steps", "finished", "measured", "wrong"].map(|key| report[key].as_u64().expect("a number"));
+    assert_eq!((numbers, report["experiment"].as_str()), ([4, 4, 0, 0], Some("tiny")), "{report}");
+    assert!(report["run"]["command"].is_string() && report["ports"].is_object(), "{report}");
     let cases = files(&at("out"));
     assert_eq!(cases, ["experiment.kdl", "square-32x32-t1-balanced", "square-64x64-t1-balanced"]);
     run(&dir, "report out -o report.html");

@@ -140,8 +140,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         return tell(compare::compare(&compare::read(old)?, &compare::read(new)?), &args.output);
     }
     if let Some(file) = &args.experiment {
-        experiment::run(file, args.folder.as_deref(), args.embree.as_deref(), &args.output)?;
-        return Ok(());
+        return experiment::run(file, args.folder.as_deref(), args.embree.as_deref(), &args.output);
     }
     args.folder.iter().chain(&args.record).try_for_each(|folder| check_folder(folder))?;
     if let Some(other) = &args.against {

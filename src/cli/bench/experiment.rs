@@ -8,7 +8,7 @@ use super::{say_ports, write, write_whole};
 use crate::bvh::LEAF_PRIMS;
 use crate::camera::framing;
 use crate::cli::interrupt::stopped;
-use crate::cli::output::OutputArgs;
+use crate::cli::output::{OutputArgs, json_to_stdout};
 use crate::error::{Error, Result};
 use crate::measure::bench::{self, Plan};
 use crate::measure::env;
@@ -24,12 +24,29 @@ use crate::scene::load::{LoadOptions, load};
 use crate::scene::world::{BuildSettings, Preset};
 use crate::trace::Engines;
 
-/// Runs the experiment in `file` into `folder` (default: one called after it); returns the folder.
+/// What was done: the object of `--json`.
+#[derive(serde::Serialize)]
+struct Report<'a> {
+    run: Run,
+    ports: &'a Ports,
+    experiment: &'a str,
+    /// Where the rows are, those of each step in CASE/CLASS/bench.csv.
+    folder: &'a Path,
+    steps: usize,
+    /// Steps that were there already.
+    finished: usize,
+    /// Steps that were measured now.
+    measured: usize,
+    /// Rows of these with wrong hits.
+    wrong: usize,
+}
+
+/// Runs the experiment in `file` into `folder` (default: one called after it).
 ///
 /// # Errors
 /// A file that is no experiment; a folder of another one; scenes that cannot be opened; [`Error::Mismatch`] if an engine is
 /// wrong; [`Error::Interrupted`] (then, and after a kill, the same command goes on where it was).
-pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &OutputArgs) -> Result<PathBuf> {
+pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &OutputArgs) -> Result<()> {
     let text = std::fs::read(file).map_err(|e| Error::io(file, e))?;
     let experiment = parse(file, &text)?;
     let folder = folder.map_or_else(|| PathBuf::from(format!("experiment-{}", experiment.name)), Path::to_path_buf);
@@ -37,34 +54,67 @@ pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &O
     output.say(&format!("{}: {}", experiment.name, experiment.question));
     let ports = Workers::new(1)?.install(Ports::measure);
     say_ports(&ports, output);
+    let left = |case: &Case| -> Vec<RayKind> {
+        let there = |kind: &RayKind| place(&folder, case, *kind).join("bench.csv").exists();
+        experiment.rays.iter().copied().filter(|kind| !there(kind)).collect()
+    };
     let steps = experiment.cases.len() * experiment.rays.len();
-    let done = |case: &Case, class: &RayKind| place(&folder, case, *class).join("bench.csv").exists();
-    let finished =
-        experiment.cases.iter().map(|c| experiment.rays.iter().filter(|k| done(c, k)).count()).sum::<usize>();
-    if finished > 0 {
-        output.say(&format!("{finished} of {steps} steps are finished already"));
+    let mut report = Report {
+        run: Run::now(experiment.cases.iter().map(|case| case.threads as usize).max().unwrap_or(0)),
+        ports: &ports,
+        experiment: &experiment.name,
+        folder: &folder,
+        steps,
+        finished: steps - experiment.cases.iter().map(|case| left(case).len()).sum::<usize>(),
+        measured: 0,
+        wrong: 0,
+    };
+    if report.finished > 0 {
+        output.say(&format!("{} of {steps} steps are finished already", report.finished));
     }
-    let bar = output.progress_bar(steps as u64, "measuring");
-    bar.inc(finished as u64);
+    let begun = Instant::now();
+    let ended = cases(&experiment, &left, (file, embree), &mut report, output);
+    if output.json {
+        json_to_stdout(&report)?;
+    }
+    ended?;
+    let Report { measured, wrong, .. } = report;
+    output.say(&format!("{measured} steps in {}; now: lanecast report {}", seconds(begun.elapsed()), folder.display()));
+    if wrong > 0 {
+        return Err(Error::Mismatch(format!("bench: {wrong} rows have wrong hits")));
+    }
+    Ok(())
+}
+
+/// All cases, each with the classes of rays that are `left` of it.
+fn cases(
+    experiment: &Experiment,
+    left: &dyn Fn(&Case) -> Vec<RayKind>,
+    (file, embree): (&Path, Option<&Path>),
+    report: &mut Report<'_>,
+    output: &OutputArgs,
+) -> Result<()> {
+    let bar = output.progress_bar(report.steps as u64, "measuring");
+    bar.inc(report.finished as u64);
     // The bar's estimate must not count what an earlier run did.
     bar.reset_eta();
     let begun = Instant::now();
-    let (mut measured, mut wrong) = (0, 0);
     // Many cases are of one scene.
     let mut said = HashSet::new();
     for case in &experiment.cases {
-        let left: Vec<RayKind> = experiment.rays.iter().copied().filter(|kind| !done(case, kind)).collect();
+        let left = left(case);
         if left.is_empty() {
             continue;
         }
         let mut step = |rows: &[Row], class: RayKind| -> Result<()> {
             let run = Run { command: case.command(class), ..Run::now(case.threads as usize) };
-            write(&place(&folder, case, class), &run, rows, &env::facts(case.threads as usize, &ports))?;
-            wrong += rows.iter().filter(|row| matches!(row.outcome, Outcome::Wrong(_))).count();
-            measured += 1;
+            let facts = env::facts(case.threads as usize, report.ports);
+            write(&place(report.folder, case, class), &run, rows, &facts)?;
+            report.wrong += rows.iter().filter(|row| matches!(row.outcome, Outcome::Wrong(_))).count();
+            report.measured += 1;
             bar.inc(1);
-            if measured == 1 {
-                let (rest, first) = ((steps - finished - 1) as u32, begun.elapsed());
+            if report.measured == 1 {
+                let (rest, first) = ((report.steps - report.finished - 1) as u32, begun.elapsed());
                 output.say(&format!(
                     "the first step took {}; {rest} to go, about {}",
                     seconds(first),
@@ -75,19 +125,15 @@ pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &O
         };
         let result = open(case, file).and_then(|description| {
             output.warn(description.warnings.iter().filter(|&warning| said.insert(warning.clone())));
-            measure(&experiment, case, &description, &left, embree, &mut step)
+            measure(experiment, case, &description, &left, embree, &mut step)
         });
         if result.is_err() {
             bar.finish_and_clear();
-            return result.map(|()| folder);
+            return result;
         }
     }
     bar.finish_and_clear();
-    output.say(&format!("{measured} steps in {}; now: lanecast report {}", seconds(begun.elapsed()), folder.display()));
-    if wrong > 0 {
-        return Err(Error::Mismatch(format!("bench: {wrong} rows have wrong hits")));
-    }
-    Ok(folder)
+    Ok(())
 }
 
 fn seconds(time: Duration) -> String {
