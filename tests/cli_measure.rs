@@ -83,6 +83,28 @@ fn bench_prints_a_table_and_writes_rows_facts_and_a_picture() {
     assert!(facts.contains(said) && said.contains(" GHz: multiply") && said.contains(" per cycle"), "{said}");
 }
 
+/// Two files of one name, the second a triangle: a heading, a name in the rows and a picture for each.
+#[test]
+fn scenes_of_one_name_have_rows_and_pictures_of_their_own() {
+    let dir = square();
+    let triangle = SQUARE.replace("element face 2", "element face 1").replace("3 0 2 3\n", "");
+    for (folder, text) in [("a", SQUARE), ("b", triangle.as_str())] {
+        std::fs::create_dir(dir.path().join(folder)).expect("a folder");
+        std::fs::write(dir.path().join(folder).join("m.ply"), text).expect("a scene");
+    }
+    let line = "bench a/m.ply b/m.ply --size 16x16 --rays primary --engines scalar --repeat 1 -o out";
+    let table = run(&dir, line).out;
+    assert!(table.contains("m: 2 primitives") && table.contains("m-2: 1 primitives"), "{table}");
+    assert_eq!(files(&dir.path().join("out")), ["bench.csv", "bench.env.txt", "m-2.exr", "m.exr"]);
+    let csv = std::fs::read_to_string(dir.path().join("out/bench.csv")).expect("rows");
+    assert!(csv.contains(",m,") && csv.contains(",m-2,"), "{csv}");
+    let triangles = |name: &str| {
+        let film = lanecast::film::exr::read(&dir.path().join("out").join(name)).expect("an EXR");
+        film.u32_plane("id.primitive").expect("ids").iter().filter(|&&id| id == 1).count()
+    };
+    assert!(triangles("m.exr") > 0 && triangles("m-2.exr") == 0);
+}
+
 /// Rays that a camera makes under the clock are checked against those it makes beforehand, in either precision: with an eye point,
 /// where engines are told where the rays go, and without.
 #[test]

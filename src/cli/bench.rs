@@ -110,7 +110,7 @@ pub struct BenchArgs {
     #[arg(long, requires = "record")]
     dirty: bool,
     /// Folder for bench.csv (one row per figure), bench.env.txt (machine and build) and a picture of each scene
-    /// (NAME.exr: colours, depth, normals, ids, node visits)
+    /// (NAME.exr: colours, depth, normals, ids, node visits; the second scene of a name is NAME-2, in the rows, too)
     #[arg(short = 'o', long = "output", value_name = "DIR")]
     folder: Option<PathBuf>,
     #[command(flatten)]
@@ -211,8 +211,10 @@ fn say_ports(ports: &Ports, output: &OutputArgs) {
 fn measure(args: &BenchArgs, workers: &Workers, rows: &mut Vec<Row>) -> Result<()> {
     let scenes = scenes(args);
     let bar = args.output.progress_bar((scenes.len() * args.rays.len()) as u64, "measuring");
+    let mut names = Vec::new();
     for scene in &scenes {
-        let description = args.options.seen_by(scene, &args.camera)?.load(scene, &args.output)?;
+        let mut description = args.options.seen_by(scene, &args.camera)?.load(scene, &args.output)?;
+        description.name = unlike(&description.name, &mut names);
         let result = match args.options.precision(&description) {
             Precision::F32 => one::<f32>(args, workers, &description, &bar, rows),
             Precision::F64 => one::<f64>(args, workers, &description, &bar, rows),
@@ -231,16 +233,29 @@ fn scenes(args: &BenchArgs) -> Vec<String> {
     if args.scenes.is_empty() { DEFAULT_SCENES.map(String::from).into() } else { args.scenes.clone() }
 }
 
-/// What the rays saw: one EXR per scene, named after it.
+/// `name`, or with a number behind it if files named after it and one of `others` would be the same; then one of the others, too.
+fn unlike(name: &str, others: &mut Vec<String>) -> String {
+    let numbered = |n: usize| if n == 1 { name.to_string() } else { format!("{name}-{n}") };
+    // One of so many numbers is free.
+    let free = (1..=others.len() + 1).map(numbered).find(|name| others.iter().all(|other| stem(other) != stem(name)));
+    let name = free.unwrap_or_else(|| name.to_string());
+    others.push(name.clone());
+    name
+}
+
+/// `name` as a file's: a scene may be called anything, a file may not.
+fn stem(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect()
+}
+
+/// What the rays saw: one EXR per scene, named after it as its rows are.
 fn pictures(args: &BenchArgs, dir: &Path) -> Result<()> {
+    let mut names = Vec::new();
     for scene in scenes(args) {
         // What it is shown without was said when it was measured.
         let quiet = OutputArgs { quiet: true, ..OutputArgs::default() };
-        let description = args.options.seen_by(&scene, &args.camera)?.load(&scene, &quiet)?;
-        // A scene may be called anything; a file may not.
-        let file_like = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
-        let stem: String = description.name.chars().map(file_like).collect();
-        let path = dir.join(format!("{stem}.exr"));
+        let name = unlike(&args.options.seen_by(&scene, &args.camera)?.load(&scene, &quiet)?.name, &mut names);
+        let path = dir.join(format!("{}.exr", stem(&name)));
         let scene = SceneArgs { scene, options: args.options.clone() };
         let mut picture = RenderArgs::plain(scene, args.camera.clone(), args.threads, path);
         picture.output.quiet = args.output.quiet;
@@ -287,4 +302,16 @@ fn write(dir: &Path, run: &Run, rows: &[Row], facts: &str) -> Result<()> {
 
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomically(path, |file| file.write_all(bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_of_one_name_are_told_apart() {
+        let mut names = Vec::new();
+        let given = ["m", "m", "m-2", "a b", "a-b", "m"].map(|name| unlike(name, &mut names));
+        assert_eq!(given, ["m", "m-2", "m-2-2", "a b", "a-b-2", "m-3"]);
+    }
 }
