@@ -182,4 +182,9 @@ fn hits_are_judged_by_the_oracle() {
     refused(at, &["compare", "a.npy", "rays.npy"], "hits");
     refused(at, &["compare", "a.npy", "b.npy", "-o", "d.exr"], "no pixels");
     refused(at, &["compare", "a.npy", "b.npy", "--max-rmse", "1"], "--max-beyond");
+    for option in ["--map flip", "--full 1", "--exposure 0", "--peak 1", "--size 4x4", "--ppd 60"] {
+        let line = format!("compare a.npy b.npy {option}");
+        let words: Vec<&str> = line.split(' ').collect();
+        refused(at, &words, words[3]);
+    }
 }

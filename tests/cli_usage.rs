@@ -102,6 +102,36 @@ fn outputs_that_cannot_be_written_are_told_before_the_work() {
     assert_eq!(binary::files(dir.path()), ["file"]);
 }
 
+/// Whatever says what is measured has no meaning where nothing is, or where a file says it.
+#[test]
+fn options_without_effect_are_refused() {
+    let dir = folder();
+    let settings = [
+        "--rays ao",
+        "--engines tile",
+        "--peers obvhs",
+        "--repeat 3",
+        "--seed 2",
+        "--threads 1",
+        "--size 8x8",
+        "--set x=1",
+        "--leaf 4",
+        "--precision f64",
+        "--fov 30",
+        "--record rows",
+        "--scaling",
+        "--turns 5",
+    ];
+    for mode in ["--compare a b", "--experiment a.kdl"] {
+        for setting in settings {
+            let line = format!("bench {mode} {setting}");
+            refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), setting.split(' ').next().unwrap_or_default());
+        }
+    }
+    refused(dir.path(), &["bench", "--turns", "5"], "--against");
+    refused(dir.path(), &["report", ".", "--readme", "text.md", "-o", "page.html"], "--output");
+}
+
 /// `--eye -1,0,0` is a point, not an option.
 #[test]
 fn negative_coordinates_are_values() {

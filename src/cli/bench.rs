@@ -88,20 +88,37 @@ pub struct BenchArgs {
     seed: u64,
     /// Show what moved between two runs: folders that -o wrote, their bench.csv files, or folders of such folders (turns);
     /// nothing is measured
-    #[arg(long, value_names = ["OLD", "NEW"], num_args = 2, conflicts_with_all = ["scenes", "engines", "peers", "folder"])]
+    #[arg(
+        long,
+        value_names = ["OLD", "NEW"],
+        num_args = 2,
+        conflicts_with_all = [
+            "scenes", "SceneOptions", "rays", "engines", "peers", "embree", "CameraArgs", "ThreadArgs", "repeat", "seed",
+            "turns", "folder"
+        ]
+    )]
     compare: Vec<PathBuf>,
     /// Measure what a file asks for (docs/EXPERIMENTS.md; scenes/experiments has some); the same command goes on where it was
     #[arg(
         long,
         value_name = "FILE.kdl",
-        conflicts_with_all = ["scenes", "engines", "peers", "compare", "against", "record"]
+        conflicts_with_all = [
+            "scenes", "SceneOptions", "rays", "engines", "peers", "CameraArgs", "ThreadArgs", "repeat", "seed",
+            "turns", "compare", "against", "record"
+        ]
     )]
     experiment: Option<PathBuf>,
     /// Take turns with another lanecast (old, new, old, new, ...) and show what moved: the surest comparison
     #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["compare", "record"])]
     against: Option<PathBuf>,
     /// Turns of each program with --against
-    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=1000))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 6,
+        requires = "against",
+        value_parser = clap::value_parser!(u32).range(3..=1000)
+    )]
     turns: u32,
     /// Keep the rows for good, in DIR/CPU/DATE-REVISION/SCENE; refused for a build whose sources no revision names
     #[arg(long, value_name = "DIR", conflicts_with = "compare")]

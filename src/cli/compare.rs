@@ -45,15 +45,15 @@ pub struct CompareArgs {
     /// Write where pictures differ: FILE.exr (signed differences and maps as planes) or FILE.png (a heat map)
     #[arg(short = 'o', long = "output", value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// What the heat map shows
-    #[arg(long, value_enum, default_value_t = Map::Flip)]
-    map: Map,
+    /// What the heat map shows [default: flip]
+    #[arg(long, value_enum)]
+    map: Option<Map>,
     /// Value of the heat map's brightest colour [default: 1 for flip and hdr-flip, else the 99.9th percentile]
     #[arg(long, value_name = "X", value_parser = positive)]
     full: Option<f32>,
-    /// Stops by which linear light is brightened for 8-bit levels and LDR-FLIP
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true, value_parser = finite)]
-    exposure: f32,
+    /// Stops by which linear light is brightened for 8-bit levels and LDR-FLIP [default: 0]
+    #[arg(long, value_name = "STOPS", allow_hyphen_values = true, value_parser = finite)]
+    exposure: Option<f32>,
     /// White of PSNR and SSIM [default: 1 for levels, else the largest value of the reference, or 1 if that is black]
     #[arg(long, value_name = "X", value_parser = positive)]
     peak: Option<f32>,
@@ -168,7 +168,7 @@ fn images(args: &CompareArgs) -> Result<()> {
     args.files.iter().try_for_each(|file| check_file(file))?;
     let (a, b) = (picture::read(&args.a, args.size)?, picture::read(&args.b, args.size)?);
     let viewing = args.ppd.map_or_else(Viewing::default, |pixels_per_degree| Viewing { pixels_per_degree });
-    let options = Options { exposure: args.exposure, peak: args.peak.map(f64::from), viewing };
+    let options = Options { exposure: args.exposure.unwrap_or(0.0), peak: args.peak.map(f64::from), viewing };
     let (report, maps) = pictures::compare(&a, &b, &options)?;
     args.files.iter().try_for_each(|path| write(args, path, (&a, &b), maps.as_ref()))?;
     let failures = args.limits.of_pictures(&report)?;
@@ -178,6 +178,17 @@ fn images(args: &CompareArgs) -> Result<()> {
 fn hits(args: &CompareArgs, a: &FileAnswers, b: &FileAnswers) -> Result<()> {
     if !args.files.is_empty() {
         return Err(Error::Usage("-o: hits have no pixels; only pictures make difference images".into()));
+    }
+    let of_pictures = [
+        (args.map.is_some(), "--map"),
+        (args.full.is_some(), "--full"),
+        (args.exposure.is_some(), "--exposure"),
+        (args.peak.is_some(), "--peak"),
+        (args.size.is_some(), "--size"),
+        (args.ppd.is_some(), "--ppd"),
+    ];
+    if let Some((_, name)) = of_pictures.iter().find(|(is_given, _)| *is_given) {
+        return Err(Error::Usage(format!("{name} is for pictures; these are files of hits")));
     }
     let mut report = hitfiles::compare(a, b)?;
     if let (Some(scene), Some(rays)) = (&args.scene, &args.rays) {
@@ -213,7 +224,7 @@ fn write(args: &CompareArgs, path: &Path, (a, b): (&Picture, &Picture), maps: Op
             let maps =
                 maps.ok_or_else(|| Error::Usage("-o: the pictures have no colours to make a heat map of".into()))?;
             let levels: Vec<f32>;
-            let (values, whole) = match args.map {
+            let (values, whole) = match args.map.unwrap_or(Map::Flip) {
                 Map::Flip => (&maps.flip.values, Some(1.0)),
                 Map::HdrFlip => {
                     let hdr = maps.hdr_flip.as_ref();

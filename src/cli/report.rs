@@ -35,7 +35,7 @@ pub struct ReportArgs {
     #[arg(long)]
     title: Option<String>,
     /// Instead of a page: make the figures between the marks of this text anew from the newest rows
-    #[arg(long, value_name = "FILE.md", conflicts_with = "title")]
+    #[arg(long, value_name = "FILE.md", conflicts_with_all = ["title", "file"])]
     readme: Option<PathBuf>,
     #[command(flatten)]
     threads: ThreadArgs,
