@@ -86,6 +86,17 @@ fn json_has_the_agreed_keys() {
     assert_eq!(report["bytes"]["total"].as_u64(), total);
 }
 
+/// No rays are no time inside: 0, not the -0 that a sum of nothing is.
+#[test]
+fn no_rays_are_0_inside() {
+    let dir = square();
+    std::fs::write(dir.path().join("rays.npy"), ray_file(&[])).expect("no rays");
+    let report = trace(dir.path(), "--query all --repeat 1 --json");
+    assert!(report.out.contains("\"stretches\":0,\"inside\":0.0,"), "{}{}", report.out, report.err);
+    let text = trace(dir.path(), "--query all --repeat 1").out;
+    assert!(text.contains("stretches 0, length 0.000000e0"), "{text}");
+}
+
 /// FNV-1a over the bytes of the hit file, worked out here again.
 #[test]
 fn the_checksum_is_that_of_the_hit_file_whatever_the_engine_and_threads() {

@@ -73,7 +73,12 @@ pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<
         threads: workers.threads(),
         rays: rays.len() as u64,
         stretches: found.len() as u64,
-        inside: found.iter().map(|s| s.t_out - s.t_in).filter(|length| length.is_finite()).sum(),
+        // The sum of nothing is -0 to `sum`.
+        inside: found
+            .iter()
+            .map(|s| s.t_out - s.t_in)
+            .filter(|length| length.is_finite())
+            .fold(0.0, |all, one| all + one),
         repeat: args.repeat,
         build_seconds: world.stats().build_seconds,
         seconds: Seconds { min: seconds.min, median: seconds.median, max: seconds.max },
