@@ -39,7 +39,7 @@ mod twig;
 
 pub use keys::FRAME;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
@@ -205,7 +205,8 @@ fn statement<'a, 'n>(lowering: &mut Lowering<'a, 'n>, node: &'n Node<'a>) -> Res
     Ok(())
 }
 
-/// SHA-256, hex, over the file, the referenced files and the values set; each part with its length before it.
+/// SHA-256, hex, over the file, the referenced files and the values set; each part with its length before it. Of the values only what
+/// makes the scene counts: the last of a name, whatever the order of names.
 fn hash(bytes: &[u8], digests: &[[u8; 32]], set: &[(String, String)]) -> String {
     let mut hasher = Sha256::new();
     let mut part = |bytes: &[u8]| {
@@ -214,6 +215,7 @@ fn hash(bytes: &[u8], digests: &[[u8; 32]], set: &[(String, String)]) -> String 
     };
     part(bytes);
     digests.iter().for_each(|d| part(d));
-    set.iter().flat_map(|(n, v)| [n, v]).for_each(|s| part(s.as_bytes()));
+    let values: BTreeMap<&str, &str> = set.iter().map(|(name, value)| (name.as_str(), value.as_str())).collect();
+    values.into_iter().flat_map(|(name, value)| [name, value]).for_each(|word| part(word.as_bytes()));
     hasher.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }
