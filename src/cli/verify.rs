@@ -18,10 +18,11 @@ Examples:
   lanecast verify model.ply --rays 100000 --kinds primary,diffuse --precision f32
 
 Every engine answers closest-hit and any-hit queries for every ray class. Each answer is judged by an f64 \
-brute-force oracle (same, explained by a rounding margin, or unexplained) and compared bit for bit with the scalar \
-engine and with itself when the rays come in another order (tile, which has an arithmetic of its own, only with \
-itself, when the same batches come in another order). The table adds up the engines; -v shows each, and so does a \
-failure. Exit code 1 if any answer is unexplained or any bit differs.";
+oracle (same, explained by a rounding margin, or unexplained) and compared bit for bit with the scalar engine and with \
+itself when the rays come in another order (tile, which has an arithmetic of its own, only with itself, when the same \
+batches come in another order). The oracle tests every primitive; of 100000 and more, those that simple trees of its own \
+leave. The table adds up the engines; -v shows each, and so does a failure. Exit code 1 if any answer is unexplained \
+or any bit differs.";
 
 /// Arguments of `lanecast verify`.
 #[derive(Debug, clap::Args)]
