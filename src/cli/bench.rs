@@ -272,7 +272,8 @@ fn pictures(args: &BenchArgs, dir: &Path) -> Result<()> {
     for scene in scenes(args) {
         // What it is shown without was said when it was measured.
         let quiet = OutputArgs { quiet: true, ..OutputArgs::default() };
-        let name = unlike(&args.options.seen_by(&scene, &args.camera)?.load(&scene, &quiet)?.name, &mut names);
+        let description = args.options.seen_by(&scene, &args.camera)?.load(&scene, &quiet)?;
+        let name = unlike(&description.name, &mut names);
         let path = dir.join(format!("{}.exr", stem(&name)));
         let scene = SceneArgs { scene, options: args.options.clone() };
         let mut picture = RenderArgs::plain(scene, args.camera.clone(), args.threads, path);

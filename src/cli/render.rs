@@ -1,6 +1,7 @@
 //! `lanecast render`: a picture of a scene.
 
 mod frames;
+mod kept;
 mod report;
 
 use std::path::PathBuf;
@@ -8,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::ProgressBar;
 
+use self::kept::{keeper, say};
 use self::report::{Holds, Made, report, tell};
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, finite, stop_flag, with_pool};
 use super::picture::{Format, Target, files, target, write_each};
@@ -18,7 +20,7 @@ use crate::film::exr::ImageInfo;
 use crate::film::{Window, check_file};
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
-use crate::render::{Aov, Keeper, Progress, RenderOptions};
+use crate::render::{Aov, Progress, RenderOptions};
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
 use crate::shade::{Integrator, Shades, unaimed, unknown_shaders};
@@ -257,12 +259,11 @@ pub(super) fn check_rt(description: &Description, lenient: bool, output: &Output
 
 /// Says that `count` emitting surfaces are too many to be aimed at, and what helps.
 fn warn_of_unaimed(args: &RenderArgs, count: u64) {
-    if count > 0 {
-        let what = format!("{count} emitting triangles and shapes are copies beyond those that paths aim at");
-        args.output.say(&format!(
-            "warning: {what}: their light is found by chance only, with more noise; place fewer of them"
-        ));
-    }
+    let what = format!(
+        "{count} emitting triangles and shapes are copies beyond those that paths aim at: their light is found by chance only, with \
+         more noise; place fewer of them"
+    );
+    args.output.warn((count > 0).then_some(&what));
 }
 
 /// The options, checked before a long build starts.
@@ -330,18 +331,7 @@ fn picture<S: Shades>(
         warn_of_unaimed(args, unaimed(world, description));
     }
     let watch = Watch { bar: args.output.progress_bar(0, "rendering"), stop: stop_flag() };
-    let keeper = args.keeps_tiles().then(|| {
-        // Whatever decides about bits, and what is counted.
-        let of = format!(
-            "{REVISION} {} {} {} {} {:?} {camera:?} {options:?}",
-            compiled_isa(),
-            description.hash,
-            engine.name(),
-            S::PRECISION,
-            args.scene.options.build(),
-        );
-        Keeper::new(format!("{}.tiles", args.file()).into(), &of)
-    });
+    let keeper = keeper(args, description, engine, &camera, options);
     let job = Job {
         engine,
         world,
@@ -355,14 +345,7 @@ fn picture<S: Shades>(
     };
     let (output, window) = job.render(&args.preview, &watch)?;
     watch.bar.finish_and_clear();
-    if let Some(keeper) = &keeper {
-        if keeper.found() > 0 {
-            args.output.say(&format!("{} of {} tiles were kept from before", keeper.found(), output.tiles_total));
-        }
-        if let Some(trouble) = keeper.trouble() {
-            args.output.say(&format!("warning: finished tiles are not kept any more: {trouble}"));
-        }
-    }
+    keeper.iter().for_each(|keeper| say(args, keeper, output.tiles_total));
     let info = ImageInfo {
         software: concat!("lanecast ", env!("CARGO_PKG_VERSION")).into(),
         revision: REVISION.into(),
