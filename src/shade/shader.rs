@@ -206,12 +206,16 @@ impl<'a, S: Real> Shader<'a, S> {
         if let Some(paths) = &self.paths {
             return paths.shade(rays, spots, work, out);
         }
+        let number = |i: usize, layer: u32| self.draw(spots.at(i)).number(0, layer);
         if self.settings.cost {
             let clock = Instant::now();
             self.trace_blocks(rays, work, &mut out.hits);
+            // Visits behind what rays pass are nobody's.
+            let Workspace { hits, scratch, again, .. } = &mut *work;
+            self.through().behind(rays, hits, scratch, again, None, number);
             work.clock.tracing += clock.elapsed();
         } else {
-            self.intersect(rays, work, |i, layer| self.draw(spots.at(i)).number(0, layer));
+            self.intersect(rays, work, number);
         }
         for first in (0..rays.padded_len()).step_by(S::Wide::N) {
             let hit = met_lanes(&work.hits, first);

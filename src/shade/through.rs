@@ -7,11 +7,14 @@ use super::classic::Classic;
 use super::look::Looks;
 use crate::lanes::Real;
 use crate::ray::{Counters, Hits, INVALID_ID, Rays};
+use crate::scene::assembly::PartKind;
 use crate::scene::world::World;
 use crate::trace::{Engine, Scratch};
 
 /// Surfaces that a ray may pass; what lies behind more of them is not seen.
 const MOST_LAYERS: u32 = 1024;
+/// Roundings within which two parameters of one surface are the same hit.
+const SAME: f64 = 16.0;
 /// Name of the number that chooses in mixtures; layers that a ray meets are named by their number.
 pub(super) const MIXTURE: u32 = u32::MAX;
 
@@ -32,11 +35,23 @@ pub(super) struct Again<S> {
     index: Vec<u32>,
     /// What of each ray's light is left.
     left: Vec<DVec3>,
+    /// Of all rays of the batch, those whose hit is one that they have passed already.
+    passed: Vec<bool>,
 }
 
 impl<S: Real> Default for Again<S> {
     fn default() -> Self {
-        Self { rays: Rays::new(0), hits: Hits::new(0), index: Vec::new(), left: Vec::new() }
+        Self { rays: Rays::new(0), hits: Hits::new(0), index: Vec::new(), left: Vec::new(), passed: Vec::new() }
+    }
+}
+
+impl<S: Real> Again<S> {
+    /// Begins with all of `count` rays.
+    fn start(&mut self, count: usize) {
+        self.index.clear();
+        self.index.extend(0..count as u32);
+        self.passed.clear();
+        self.passed.resize(count, false);
     }
 }
 
@@ -53,24 +68,74 @@ impl<S: Real> Through<'_, S> {
         number: impl Fn(usize, u32) -> f64,
     ) {
         self.engine.intersect(self.world, rays, hits, scratch, counters.as_deref_mut());
+        self.behind(rays, hits, scratch, again, counters, number);
+    }
+
+    /// Moves the closest `hits` of `rays` on to what is behind, where opacity lets rays pass; see [`Self::closest`].
+    pub fn behind(
+        &self,
+        rays: &Rays<S>,
+        hits: &mut Hits<S>,
+        scratch: &mut Scratch,
+        again: &mut Again<S>,
+        mut counters: Option<&mut Counters>,
+        number: impl Fn(usize, u32) -> f64,
+    ) {
         if !self.looks.has_holes {
             return;
         }
-        let Again { rays: behind, hits: found, index, .. } = again;
-        index.clear();
-        index.extend(0..rays.len() as u32);
+        again.start(rays.len());
         for layer in 0..MOST_LAYERS {
+            let Again { index, passed, .. } = again;
             index.retain(|&i| {
+                if passed[i as usize] {
+                    return true;
+                }
                 let opacity = self.opacity(rays, hits, i as usize);
                 opacity < 1.0 && number(i as usize, layer) >= opacity
             });
             if index.is_empty() {
                 return;
             }
-            go_behind(rays, hits, index, behind);
-            self.engine.intersect(self.world, behind, found, scratch, counters.as_deref_mut());
-            index.iter().enumerate().for_each(|(k, &i)| copy(found, k, hits, i as usize));
+            self.go_on(rays, hits, scratch, again, counters.as_deref_mut());
         }
+    }
+
+    /// Traces the listed rays on from behind their hits. An engine with an arithmetic of its own may find the same hit once more, a
+    /// rounding farther away, when other rays go with it; who has passed it has passed it.
+    fn go_on(
+        &self,
+        rays: &Rays<S>,
+        hits: &mut Hits<S>,
+        scratch: &mut Scratch,
+        again: &mut Again<S>,
+        counters: Option<&mut Counters>,
+    ) {
+        let Again { rays: behind, hits: found, index, passed, .. } = again;
+        behind.reset(index.len());
+        for (k, &i) in index.iter().enumerate() {
+            let i = i as usize;
+            let t = hits.t[i];
+            let start = if passed[i] { (t + roundings(t)).fast_max(t.next_up()) } else { t.next_up() };
+            behind.set(k, rays.org(i), rays.dir(i), start, rays.t_max[i]);
+        }
+        self.engine.intersect(self.world, behind, found, scratch, counters);
+        for (k, &i) in index.iter().enumerate() {
+            let i = i as usize;
+            passed[i] = self.is_same(hits, i, found, k);
+            copy(found, k, hits, i);
+        }
+    }
+
+    /// Whether two hits of one ray are the same: a line meets a triangle once; other surfaces where they are met about there.
+    fn is_same(&self, one: &Hits<S>, i: usize, other: &Hits<S>, k: usize) -> bool {
+        let (prim, inst) = (other.prim[k], other.inst[k]);
+        if !other.is_hit(k) || (prim, inst) != (one.prim[i], one.inst[i]) {
+            return false;
+        }
+        let assembly = &self.world.assembly;
+        let part = assembly.part_of(assembly.placements[inst as usize].object, prim);
+        matches!(part.kind, PartKind::Mesh(_)) || other.t[k] <= one.t[i] + roundings(one.t[i])
     }
 
     /// Whether surfaces stop all light that meets them; `glass`: see [`Self::shadows`].
@@ -112,16 +177,15 @@ impl<S: Real> Through<'_, S> {
         glass: bool,
         mut counters: Option<&mut Counters>,
     ) -> &'m [DVec3] {
-        let Again { rays: behind, hits: found, index, left } = again;
-        left.clear();
-        left.resize(rays.len(), DVec3::ONE);
         self.engine.intersect(self.world, rays, hits, scratch, counters.as_deref_mut());
-        index.clear();
-        index.extend(0..rays.len() as u32);
+        again.start(rays.len());
+        again.left.clear();
+        again.left.resize(rays.len(), DVec3::ONE);
         for _ in 0..MOST_LAYERS {
+            let Again { index, left, passed, .. } = &mut *again;
             index.retain(|&i| {
                 let i = i as usize;
-                if hits.is_hit(i) {
+                if hits.is_hit(i) && !passed[i] {
                     left[i] *= self.passed(rays, hits, i, glass);
                 }
                 hits.is_hit(i) && left[i] != DVec3::ZERO
@@ -129,11 +193,10 @@ impl<S: Real> Through<'_, S> {
             if index.is_empty() {
                 break;
             }
-            go_behind(rays, hits, index, behind);
-            self.engine.intersect(self.world, behind, found, scratch, counters.as_deref_mut());
-            index.iter().enumerate().for_each(|(k, &i)| copy(found, k, hits, i as usize));
+            self.go_on(rays, hits, scratch, again, counters.as_deref_mut());
         }
         // What is still inside after so many layers is dark.
+        let Again { index, left, .. } = again;
         index.iter().for_each(|&i| left[i as usize] = DVec3::ZERO);
         left
     }
@@ -173,13 +236,9 @@ fn numbers<S: Real>(rays: &Rays<S>, hits: &Hits<S>, i: usize) -> (DVec3, DVec3, 
     (org, dir, [hits.t[i], hits.u[i], hits.v[i]].map(S::to_f64))
 }
 
-/// The rays `index` of `rays` from behind their hits, into `behind`.
-fn go_behind<S: Real>(rays: &Rays<S>, hits: &Hits<S>, index: &[u32], behind: &mut Rays<S>) {
-    behind.reset(index.len());
-    for (k, &i) in index.iter().enumerate() {
-        let i = i as usize;
-        behind.set(k, rays.org(i), rays.dir(i), hits.t[i].next_up(), rays.t_max[i]);
-    }
+/// What a parameter may be off by in an arithmetic of tiles' own, whose depths are a few roundings from it.
+fn roundings<S: Real>(t: S) -> S {
+    t.abs() * S::from_f64(SAME) * S::EPSILON
 }
 
 fn copy<S: Real>(from: &Hits<S>, k: usize, to: &mut Hits<S>, i: usize) {
