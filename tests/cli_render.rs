@@ -160,7 +160,7 @@ fn half_opaque_surfaces_are_half_seen() {
             let line = format!("render m.kdl -o out.exr --size 64x64 --spp 16 {more}");
             let ended = lanecast(dir.path(), &line.split(' ').collect::<Vec<_>>());
             assert_eq!(ended.code, Some(0), "{line}: {}", ended.err);
-            let film = lanecast::film::exr::read(&dir.path().join("out.exr")).expect("a picture");
+            let film = exr::read(&dir.path().join("out.exr")).expect("a picture");
             let red = film.f32_plane("R").expect("R");
             let mean = red.iter().map(|x| f64::from(*x)).sum::<f64>() / red.len() as f64;
             // Of 65 536 samples the mean is off by 0.002.
