@@ -238,6 +238,10 @@ impl<'a> Parser<'a> {
 }
 
 fn apply(name: &str, arguments: &[f64]) -> f64 {
+    // `f64::min` and `f64::max` prefer numbers, and casts to integers make NaN 0: what is undefined would be lost.
+    if arguments.iter().any(|x| x.is_nan()) {
+        return f64::NAN;
+    }
     let x = arguments[0];
     match name {
         "sqrt" => x.sqrt(),
@@ -332,6 +336,9 @@ mod tests {
             ("(1", 2, "expected `)`"),
             ("1 / 0", 0, "not finite"),
             ("sqrt(0-1)", 0, "not finite"),
+            ("min(sqrt(0-1), 0.5)", 0, "not finite"),
+            ("max(0.5, 1, sqrt(0-1))", 0, "not finite"),
+            ("random(1, sqrt(0-1))", 0, "not finite"),
             ("2 * radios", 4, "found `radios`"),
             ("sqr(2)", 0, "unknown function"),
             ("sqrt(1, 2)", 0, "takes 1 arguments, found 2"),
