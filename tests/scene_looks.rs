@@ -82,8 +82,18 @@ fn mixes_name_materials_that_may_come_later() {
         nested += &format!("material \"m{i}\" {{ mix \"m{}\" \"m0\" \"1 / 4\" }}\n", i - 1);
     }
     assert_eq!(scene(&nested).materials[9].scattering, Scattering::Mix { first: 8, second: 1, amount: 0.25 });
-    let error = read_in(None, &(nested + "material \"m9\" { mix \"m0\" \"m8\" 0 }")).unwrap_err().to_string();
-    assert!(error.contains("nest deeper than 8 levels"), "{error}");
+    // One too deep, on line 10: a shallow mix after it hides nothing, nor do deeper ones, in either order.
+    let too_deep = nested + "material \"m9\" { mix \"m0\" \"m8\" 0 }\n";
+    let shallow = "material \"last\" { mix \"m0\" \"m0\" 0 }\n";
+    let chain: Vec<String> =
+        (1..60).map(|i| format!("material \"m{i}\" {{ mix \"m{}\" \"m0\" 0 }}\n", i - 1)).collect();
+    let rising = format!("material \"m0\"\n{}{shallow}", chain.concat());
+    let falling = chain.iter().rev().fold(String::new(), |text, line| text + line) + "material \"m0\"\n" + shallow;
+    for (text, line) in [(too_deep.clone(), 10), (too_deep + shallow, 10), (rising, 10), (falling, 1)] {
+        let error = read_in(None, &text).unwrap_err().to_string();
+        let place = format!("t.kdl:{line}:");
+        assert!(error.starts_with(&place) && error.contains("nest deeper than 8 levels"), "{error}");
+    }
 }
 
 #[test]

@@ -175,22 +175,21 @@ pub fn resolve<'k>(
     // The depth of each grows by rounds; one that is in itself never stops.
     let mut depth = vec![0; materials.len()];
     for _ in 0..=MAX_MIXES {
-        let mut changed = None;
+        let mut is_settled = true;
         for mix in mixes {
             let Scattering::Mix { first, second, .. } = materials[mix.material as usize].scattering else { continue };
             let deeper = 1 + depth[first as usize].max(depth[second as usize]);
-            if deeper > depth[mix.material as usize] {
-                depth[mix.material as usize] = deeper;
-                changed = Some(mix);
-            }
-        }
-        match changed {
-            None => return Ok(()),
-            Some(mix) if depth[mix.material as usize] > MAX_MIXES => {
+            if deeper > MAX_MIXES {
                 let what = format!("mixes contain themselves, or nest deeper than {MAX_MIXES} levels");
                 return Err(scope.source.error(mix.names[0].1, what));
             }
-            Some(_) => {}
+            if deeper > depth[mix.material as usize] {
+                depth[mix.material as usize] = deeper;
+                is_settled = false;
+            }
+        }
+        if is_settled {
+            break;
         }
     }
     Ok(())
