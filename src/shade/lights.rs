@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use crate::camera::Camera;
-use crate::lanes::space::{scale, sub};
+use crate::lanes::space::{add, scale, sub};
 use crate::lanes::{Lanes, Lanes3, Real, dot, map3};
 use crate::scene::description::Light;
 
@@ -25,8 +25,8 @@ pub(super) struct Lamp<V> {
     toward: Lanes3<V>,
     /// Intensity; of a light that is far irradiance.
     strength: Lanes3<V>,
-    /// Of a spot light its unit direction, and the cosines of its angles.
-    spot: Option<(Lanes3<V>, [V; 2])>,
+    /// How a spot light's intensity falls off.
+    spot: Option<Spot<V>>,
 }
 
 impl<V: Lanes> Lamp<V> {
@@ -37,9 +37,7 @@ impl<V: Lanes> Lamp<V> {
         match *light {
             Light::Point { position, intensity } | Light::Spot { position, intensity, .. } => {
                 let spot = match *light {
-                    Light::Spot { direction, inner, outer, .. } => {
-                        Some((vector(direction.normalize_or_zero()), [inner.cos(), outer.cos()].map(V::constant)))
-                    }
+                    Light::Spot { direction, inner, outer, .. } => Some(Spot::new(direction, inner, outer)),
                     _ => None,
                 };
                 Self { position: Some(vector(position)), toward: nowhere, strength: vector(intensity), spot }
@@ -65,8 +63,7 @@ impl<V: Lanes> Lamp<V> {
                 let scaled = scale(to_light, nearer);
                 let square = dot(scaled, scaled);
                 let toward = scale(scaled, V::constant(1.0) / square.sqrt());
-                let share =
-                    self.spot.map_or(V::constant(1.0), |(axis, cosines)| spot_share(-dot(toward, axis), cosines));
+                let share = self.spot.as_ref().map_or(V::constant(1.0), |spot| spot.share(toward));
                 // One division for three colours.
                 let share = share / square;
                 (map3(self.strength, |x| x * share * nearer * nearer), toward)
@@ -93,14 +90,43 @@ impl<V: Lanes> Lamp<V> {
     }
 }
 
-/// Share of a spot light's intensity that goes along directions at cosine `cosine` to its own; `inner` and `outer` are the
-/// cosines of the angles within which all and beyond which nothing goes.
+/// How the intensity of a spot light falls off away from its axis. Angles are kept as the heights of their caps, 1 - cos,
+/// which narrow spots have many digits of where their cosines have few.
 /// Source: the attenuation that the glTF extension KHR_lights_punctual recommends.
-#[inline(always)]
-pub(super) fn spot_share<V: Lanes>(cosine: V, [inner, outer]: [V; 2]) -> V {
-    let share = (cosine - outer) / (inner - outer).fast_max(V::constant(1e-6));
-    let share = share.fast_max(V::constant(0.0)).fast_min(V::constant(1.0));
-    share * share
+pub(super) struct Spot<V> {
+    /// Unit direction of the axis.
+    axis: Lanes3<V>,
+    /// Height of the angle beyond which nothing goes.
+    outer: V,
+    /// How much that is above the height of the angle within which all goes.
+    fade: V,
+}
+
+impl<V: Lanes> Spot<V> {
+    /// Below it the edge is sharp: angles this small are beyond the digits of a direction.
+    const LEAST_FADE: f64 = 1e-30;
+
+    /// The spot light along `direction` with angles `inner` and `outer`.
+    pub fn new(direction: DVec3, inner: f64, outer: f64) -> Self {
+        // cos a - cos b = 2 sin((b + a) / 2) sin((b - a) / 2).
+        let fall = |from: f64, to: f64| 2.0 * (0.5 * (to + from)).sin() * (0.5 * (to - from)).sin();
+        Self {
+            axis: direction.normalize_or_zero().to_array().map(V::constant),
+            outer: V::constant(fall(0.0, outer)),
+            fade: V::constant(fall(inner, outer).max(Self::LEAST_FADE)),
+        }
+    }
+
+    /// Share of the intensity that arrives where the unit direction `toward` leads to the light.
+    #[inline(always)]
+    pub fn share(&self, toward: Lanes3<V>) -> V {
+        // The chord between two unit directions: its square is twice the height.
+        let chord = add(toward, self.axis);
+        let height = V::constant(0.5) * dot(chord, chord);
+        let share = (self.outer - height) / self.fade;
+        let share = share.fast_max(V::constant(0.0)).fast_min(V::constant(1.0));
+        share * share
+    }
 }
 
 #[cfg(test)]
@@ -158,6 +184,33 @@ mod tests {
             [(1.0, 1.0), (inner.cos() + 1e-9, 1.0), (middle, 0.25), (outer.cos() - 1e-9, 0.0), (-1.0, 0.0)]
         {
             assert!((at(cosine) - share).abs() < 1e-12, "{cosine}");
+        }
+    }
+
+    /// Where the height of the cap is half the whole one, at its angle over the root of 2 as angles are small, a quarter goes.
+    #[test]
+    fn narrow_spot_lights_are_full_along_their_axis() {
+        for (outer, in_f32) in [(1e-2, true), (8.7e-4, true), (1e-4, true), (1e-7, false)] {
+            let light = Light::Spot {
+                position: DVec3::ZERO,
+                direction: DVec3::X,
+                intensity: DVec3::splat(50.0),
+                inner: 0.0,
+                outer,
+            };
+            for (angle, share) in [(0.0, 1.0), (outer * 0.5f64.sqrt(), 0.25), (1.5 * outer, 0.0)] {
+                let p = DVec3::new(angle.cos(), angle.sin(), 0.0);
+                let exact = irradiance(&light, p, -p).unwrap().x;
+                assert!((exact / 50.0 - share).abs() < 1e-5, "{outer} {angle}: {exact}");
+                let (short, _) = Lamp::<f32>::new(&light).irradiance(p.as_vec3().to_array(), (-p).as_vec3().to_array());
+                assert!(!in_f32 || (short[0] / 50.0 - share as f32).abs() < 1e-4, "{outer} {angle}: {short:?}");
+            }
+        }
+        let sharp =
+            Light::Spot { position: DVec3::ZERO, direction: DVec3::X, intensity: DVec3::ONE, inner: 0.3, outer: 0.3 };
+        for (angle, share) in [(0.299_f64, 1.0), (0.301, 0.0)] {
+            let p = DVec3::new(angle.cos(), angle.sin(), 0.0);
+            assert!((irradiance(&sharp, p, -p).unwrap().x - share).abs() < 1e-12, "{angle}");
         }
     }
 }

@@ -8,7 +8,7 @@ use super::lights::in_cone;
 use crate::lanes::Real;
 use crate::scene::description::Light;
 use crate::scene::world::World;
-use crate::shade::lights::spot_share;
+use crate::shade::lights::Spot;
 use crate::shade::look::Looks;
 
 /// Something that shines.
@@ -126,7 +126,7 @@ impl Emitter {
         match *self {
             Self::Light(Light::Point { intensity, .. }) => mean(intensity) * 4.0 * PI,
             Self::Light(Light::Spot { intensity, inner, outer, .. }) => {
-                mean(intensity) * TAU * (1.0 - 0.5 * (inner.cos() + outer.cos()))
+                mean(intensity) * TAU * 0.5 * (height(inner) + height(outer))
             }
             Self::Light(Light::Directional { irradiance, .. } | Light::Sun { irradiance, .. }) => {
                 mean(irradiance) * PI * radius * radius
@@ -174,7 +174,7 @@ impl Emitter {
     /// Radiance of a sun in direction `dir` (unit) and the density of [`Self::aim`] there.
     pub fn sun(&self, dir: DVec3) -> Option<(DVec3, f64)> {
         let Self::Light(Light::Sun { direction, irradiance, radius }) = *self else { return None };
-        let height = sun_height(radius);
+        let height = height(radius);
         let inside = 1.0 + dir.dot(direction.normalize_or_zero()) <= height;
         inside.then(|| (sun_radiance(irradiance, radius), 1.0 / (TAU * height)))
     }
@@ -272,9 +272,7 @@ fn aim_at_light(light: &Light, from: DVec3, place: [f64; 2]) -> Option<Aim> {
             let away = position - from;
             let dir = away.try_normalize()?;
             let share = match *light {
-                Light::Spot { direction, inner, outer, .. } => {
-                    spot_share(-dir.dot(direction.normalize_or_zero()), [inner.cos(), outer.cos()])
-                }
+                Light::Spot { direction, inner, outer, .. } => Spot::new(direction, inner, outer).share(dir.to_array()),
                 _ => 1.0,
             };
             let radiance = intensity * (share / away.length_squared());
@@ -289,16 +287,16 @@ fn aim_at_light(light: &Light, from: DVec3, place: [f64; 2]) -> Option<Aim> {
         }
         Light::Directional { direction, irradiance } => far(-direction.try_normalize()?, 1.0, irradiance, true),
         Light::Sun { direction, irradiance, radius } => {
-            let height = sun_height(radius);
+            let height = height(radius);
             let dir = in_cone(-direction.try_normalize()?, height, place);
             far(dir, 1.0 / (TAU * height), sun_radiance(irradiance, radius), false)
         }
     }
 }
 
-/// `1 - cos` of a sun's radius.
-fn sun_height(radius: f64) -> f64 {
-    2.0 * (0.5 * radius).sin().powi(2)
+/// `1 - cos` of an angle, to all digits also where it is small: the height of the cap of a unit sphere within it.
+fn height(angle: f64) -> f64 {
+    2.0 * (0.5 * angle).sin().powi(2)
 }
 
 /// Irradiance of a disc of radiance L, face on, is L pi sin^2 of its radius.
@@ -329,6 +327,20 @@ mod tests {
         assert!((aim.pdf * solid_angle - 1.0).abs() < 1e-9);
         let inside = aim_at_sphere(centre + DVec3::X * 0.1, centre, radius, [0.3, 0.4]).unwrap();
         assert!(((inside.target - centre).length() - radius).abs() < 1e-12 && inside.pdf > 0.0);
+    }
+
+    /// A spot of a twentieth of a degree, and one of a millionth part of that.
+    #[test]
+    fn narrow_spots_are_as_bright_as_they_say() {
+        for outer in [0.05f64.to_radians(), 5e-8f64.to_radians()] {
+            let (position, direction, intensity) = (DVec3::Z * 4.0, -DVec3::Z, DVec3::splat(50.0));
+            let light = Light::Spot { position, direction, intensity, inner: 0.0, outer };
+            let seen = |x: f64| aim_at_light(&light, DVec3::X * x, [0.5; 2]).unwrap().radiance.x;
+            assert!((seen(0.0) - 50.0 / 16.0).abs() < 1e-9, "{}", seen(0.0));
+            // At half the height of the cap, and outside.
+            assert!((seen(4.0 * outer * 0.5f64.sqrt()) - 0.25 * 50.0 / 16.0).abs() < 1e-5);
+            assert_eq!(seen(4.0 * 1.5 * outer), 0.0);
+        }
     }
 
     #[test]
