@@ -113,10 +113,10 @@ fn teaching_is_small_and_gallery_complete() {
     assert!(has(|s| *s == Shape::Cuboid), "box");
     assert!(has(|s| *s == Shape::Disc), "disc");
     assert!(has(|s| *s == Shape::Cylinder), "cylinder");
-    assert!(has(|s| *s == Shape::Cone { top: 0.0 }), "cone");
+    assert!(has(|s| *s == Shape::cone(0.0)), "cone");
     let shapes = || gallery.groups[0].items.iter().map(|i| &i.kind);
     assert!(shapes().any(|k| matches!(k, ItemKind::Shape(Shape::HalfSpace))));
-    assert!(shapes().any(|k| matches!(k, ItemKind::Shape(Shape::Cone { top }) if *top > 0.0)));
+    assert!(shapes().any(|k| matches!(k, ItemKind::Shape(Shape::Cone { top, .. }) if *top > 0.0)));
     assert!(shapes().any(|k| matches!(k, ItemKind::Mesh(_))));
 }
 

@@ -21,9 +21,9 @@ pub(super) fn to_face(shape: Shape, face: u32, to_world: &DMat3, p: DVec3) -> f6
         (Shape::HalfSpace, 0) => flat(0.0, f64::INFINITY),
         (Shape::Disc, 0) | (Shape::Cylinder | Shape::Cone { .. }, 1) => flat(0.0, 1.0),
         (Shape::Cylinder, 2) => flat(1.0, 1.0),
-        (Shape::Cone { top }, 2) => flat(1.0, top),
+        (Shape::Cone { top, .. }, 2) => flat(1.0, top),
         (Shape::Cylinder, 0) => to_side(1.0, p, to_world),
-        (Shape::Cone { top }, 0) => to_side(1.0 - (1.0 - top) * p.z.clamp(0.0, 1.0), p, to_world),
+        (Shape::Cone { top, .. }, 0) => to_side(1.0 - (1.0 - top) * p.z.clamp(0.0, 1.0), p, to_world),
         (Shape::Cuboid, 0..6) => {
             let axis = face as usize / 2;
             let height = if face.is_multiple_of(2) { -1.0 } else { 1.0 };
@@ -132,7 +132,7 @@ impl Outline {
             Shape::Sphere => d.normalize_or(DVec3::X),
             Shape::Cuboid => d.map(|x| 1f64.copysign(x)),
             Shape::Cylinder => rim + up,
-            Shape::Cone { top } => {
+            Shape::Cone { top, .. } => {
                 let (low, high) = (rim, rim * top + DVec3::Z);
                 if low.dot(d) < high.dot(d) { high } else { low }
             }
@@ -190,8 +190,8 @@ mod tests {
         (Shape::Disc, 1),
         (Shape::Cuboid, 6),
         (Shape::Cylinder, 3),
-        (Shape::Cone { top: 0.4 }, 3),
-        (Shape::Cone { top: 0.0 }, 2),
+        (Shape::cone(0.4), 3),
+        (Shape::cone(0.0), 2),
     ];
 
     /// Points all over a face, or inside of a shape where `face` is `None`.
@@ -210,9 +210,9 @@ mod tests {
                 }
                 (Shape::Cuboid, None) => p,
                 (Shape::Disc, _) | (_, Some(1)) => round.extend(0.0),
-                (Shape::Cone { top }, Some(2)) => (round * top).extend(1.0),
-                (Shape::Cone { top }, Some(_)) => (rim * (1.0 - (1.0 - top) * z)).extend(z),
-                (Shape::Cone { top }, None) => (round * (1.0 - (1.0 - top) * z)).extend(z),
+                (Shape::Cone { top, .. }, Some(2)) => (round * top).extend(1.0),
+                (Shape::Cone { top, .. }, Some(_)) => (rim * (1.0 - (1.0 - top) * z)).extend(z),
+                (Shape::Cone { top, .. }, None) => (round * (1.0 - (1.0 - top) * z)).extend(z),
                 (_, Some(2)) => round.extend(1.0),
                 (_, Some(_)) => rim.extend(z),
                 (_, None) => round.extend(z),
@@ -264,7 +264,7 @@ mod tests {
         // In world space y = 0.2, and the rim at x = 500 has y = 0.0866.
         let near = to_face(Shape::Disc, 0, &map, beside);
         assert!((near - (0.2 - 0.1 * 0.75f64.sqrt())).abs() < 1e-4, "{near}");
-        for shape in [Shape::Cylinder, Shape::Cone { top: 1.0 }] {
+        for shape in [Shape::Cylinder, Shape::cone(1.0)] {
             let inside = to_face(shape, 0, &map, DVec3::new(0.5, 0.5, 0.5));
             let want = 0.1 * (0.75f64.sqrt() - 0.5);
             assert!((inside - want).abs() < 1e-4 * want, "{shape:?} {inside} {want}");

@@ -100,7 +100,7 @@ fn solid(shape: Shape, org: DVec3, dir: DVec3) -> Option<Span> {
             let side = quadric(dir_xy.dot(dir_xy), org_xy.dot(dir_xy), org_xy.dot(org_xy) - 1.0)[0];
             side?.and(caps()?)
         }
-        Shape::Cone { top } => {
+        Shape::Cone { top, .. } => {
             // Inside: |xy| <= radius(z) = 1 - k z. Within the caps the mirrored cone beyond the apex plays no part
             // but for the apex itself, so the longer piece is the solid's.
             let k = 1.0 - top;
@@ -138,7 +138,7 @@ pub(super) fn normal(shape: Shape, face: u32, p: DVec3) -> DVec3 {
         Shape::Sphere => p,
         Shape::Cuboid => DVec3::AXES[face as usize / 2] * if face.is_multiple_of(2) { -1.0 } else { 1.0 },
         Shape::Cylinder if face == 0 => side,
-        Shape::Cone { top } if face == 0 => side + DVec3::Z * ((1.0 - top) * side.length()),
+        Shape::Cone { top, .. } if face == 0 => side + DVec3::Z * ((1.0 - top) * side.length()),
         Shape::Cylinder | Shape::Cone { .. } => cap,
     };
     if n == DVec3::ZERO { DVec3::Z } else { n }
@@ -226,11 +226,11 @@ mod tests {
 
     #[test]
     fn cone() {
-        let (pointed, blunt) = (Shape::Cone { top: 0.0 }, Shape::Cone { top: 0.5 });
+        let (pointed, blunt) = (Shape::cone(0.0), Shape::cone(0.5));
         // Radius 0.5 at half height, 0.75 for the blunt one.
         close(&ts(pointed, [-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]), &[(2.5, 0), (3.5, 0)]);
         close(&ts(blunt, [-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]), &[(2.25, 0), (3.75, 0)]);
-        close(&ts(Shape::Cone { top: 1.0 }, [-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]), &[(2.0, 0), (4.0, 0)]);
+        close(&ts(Shape::cone(1.0), [-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]), &[(2.0, 0), (4.0, 0)]);
         // Parallel to the axis at x = 0.25: the side is at z = 0.75.
         close(&ts(pointed, [0.25, 0.0, 3.0], [0.0, 0.0, -1.0]), &[(2.25, 0), (3.0, 1)]);
         close(&ts(blunt, [0.25, 0.0, 3.0], [0.0, 0.0, -1.0]), &[(2.0, 2), (3.0, 1)]);
@@ -247,8 +247,7 @@ mod tests {
 
     #[test]
     fn crossings_lie_on_the_surface_and_normals_point_outwards() {
-        let shapes =
-            [Shape::Sphere, Shape::Cuboid, Shape::Cylinder, Shape::Cone { top: 0.0 }, Shape::Cone { top: 0.7 }];
+        let shapes = [Shape::Sphere, Shape::Cuboid, Shape::Cylinder, Shape::cone(0.0), Shape::cone(0.7)];
         let mut hits = 0;
         for i in 0..20_000u32 {
             let f = |k: u32| f64::from((i.wrapping_mul(k) >> 8) % 2001) / 1000.0 - 1.0;
@@ -273,7 +272,7 @@ mod tests {
                         (_, 1) => p.z,
                         (_, 2) => p.z - 1.0,
                         (Shape::Cylinder, _) => p.x.hypot(p.y) - 1.0,
-                        (Shape::Cone { top }, _) => p.x.hypot(p.y) - (1.0 - (1.0 - top) * p.z),
+                        (Shape::Cone { top, .. }, _) => p.x.hypot(p.y) - (1.0 - (1.0 - top) * p.z),
                         _ => unreachable!("solids only"),
                     };
                     assert!(off.abs() < 1e-7, "{shape:?} {face} {p} {off}");

@@ -124,7 +124,16 @@ pub enum Shape {
     Cone {
         /// Radius at z = 1 relative to the base.
         top: f64,
+        /// Whether it is the mirror image, z for 1 - z, of one that widens upwards, whose texture coordinates it has.
+        is_mirrored: bool,
     },
+}
+
+impl Shape {
+    /// The cone whose radius at z = 1 is `top`.
+    pub const fn cone(top: f64) -> Self {
+        Self::Cone { top, is_mirrored: false }
+    }
 }
 
 /// A camera as written in a file.

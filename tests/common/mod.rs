@@ -54,15 +54,8 @@ impl Random {
     }
 }
 
-pub const SHAPES: [Shape; 7] = [
-    Shape::Sphere,
-    Shape::HalfSpace,
-    Shape::Disc,
-    Shape::Cuboid,
-    Shape::Cylinder,
-    Shape::Cone { top: 0.0 },
-    Shape::Cone { top: 0.4 },
-];
+pub const SHAPES: [Shape; 7] =
+    [Shape::Sphere, Shape::HalfSpace, Shape::Disc, Shape::Cuboid, Shape::Cylinder, Shape::cone(0.0), Shape::cone(0.4)];
 
 pub fn item(kind: ItemKind, transform: DAffine3) -> Item {
     Item { transform, material: None, kind }

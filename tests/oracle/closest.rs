@@ -36,7 +36,7 @@ fn trees_answer_like_brute_force() {
     let mesh = mesh_scene(soup(&mut random, 3000, 0.1));
     assert!(compare_searches(&mesh, &mut random, DVec3::ZERO, 1.0, 2000) > 500);
     // Instances of a mesh and shapes, turned and stretched, over a ground plane.
-    let shapes = [Shape::Sphere, Shape::Disc, Shape::Cuboid, Shape::Cylinder, Shape::Cone { top: 0.3 }];
+    let shapes = [Shape::Sphere, Shape::Disc, Shape::Cuboid, Shape::Cylinder, Shape::cone(0.3)];
     let mut group: Vec<_> =
         shapes.iter().map(|&s| shape(s, DAffine3::from_translation(2.0 * random.vector()))).collect();
     group.push(Item { transform: DAffine3::IDENTITY, material: None, kind: ItemKind::Mesh(0) });

@@ -3,11 +3,13 @@
 use crate::path_support;
 
 use std::f64::consts::PI;
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3};
 use lanecast::camera::sampling::PixelRandom;
 use lanecast::scene::description::{Description, Item, ItemKind, Material, Shape};
+use lanecast::scene::kdl::{meshes::MeshFiles, parse};
 use lanecast::scene::material::{Scattering, TextureRef};
 use lanecast::scene::mesh::{Attribute, Mesh};
 use lanecast::scene::texture::{Texels, Texture};
@@ -47,6 +49,41 @@ fn pictures_stand_upright_on_shapes() {
     let half = 0.5f64.sqrt();
     for ([y, z], want) in [[half, half], [-half, half], [half, -half], [-half, -half]].into_iter().zip(colours) {
         near("sphere", at(4.0, y, z, DVec3::new(0.0, y, z) * 3.0), want, 1e-6);
+    }
+}
+
+/// Whichever end is the wider, and however the cone is written.
+#[test]
+fn pictures_stand_upright_on_cones() {
+    let truncated = |c: f64, d: f64| {
+        format!("truncated-cone material=\"m\" {{ base 0 0 -1; height 0 0 2; a 1 0 0; b 0 1 0; c {c} 0 0; d 0 {d} 0 }}")
+    };
+    let cone = |top: f64| format!("cone material=\"m\" top={top} {{ from 0 0 -1; to 0 0 1 }}");
+    let half = [[-0.4, 0.4], [0.4, 0.4], [-0.4, -0.4], [0.4, -0.4]];
+    for text in [
+        cone(0.75),
+        cone(1.5),
+        format!("union {{ {} }}", cone(1.5)),
+        truncated(0.75, 0.75),
+        truncated(1.5, 1.5),
+        truncated(1.5, 1.25),
+    ] {
+        let files = MeshFiles { folder: None, allow_outside: false, read: &|_| panic!("no meshes here") };
+        let scene = format!("material \"m\"\n{text}");
+        let mut d = parse(Path::new("t.kdl"), "t", scene.as_bytes(), &[], &files).unwrap();
+        let mut material = lamp(1.0);
+        material.textures.emission = Some(four(&mut d));
+        d.materials[1] = material;
+        let at = |place: DVec3, from: DVec3| seen::<f32>(&d, &look(place + from, place, 1e-3), &paths(2, 4, 0));
+        let colours = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::splat(0.5)];
+        // The left half of the picture is the half towards +y, as on spheres.
+        for ([y, z], want) in [[1.0, 0.5], [-1.0, 0.5], [1.0, -0.5], [-1.0, -0.5]].into_iter().zip(colours) {
+            near(&text, at(DVec3::Z * z, DVec3::Y * (4.0 * y)), want, 1e-6);
+        }
+        for ([x, y], want) in half.into_iter().zip(colours) {
+            near(&text, at(DVec3::new(x, y, 1.0), DVec3::Z * 3.0), want, 1e-6);
+            near(&text, at(DVec3::new(-x, y, -1.0), DVec3::Z * -3.0), want, 1e-6);
+        }
     }
 }
 

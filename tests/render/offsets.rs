@@ -73,7 +73,7 @@ fn all_open<S: Shades>() {
         ("far", DAffine3::from_translation(DVec3::new(200.0, -300.0, 100.0))),
         ("stretched", DAffine3::from_mat3_translation(stretch, DVec3::new(5.0, 6.0, 7.0))),
     ];
-    let cone = Shape::Cone { top: 0.4 };
+    let cone = Shape::cone(0.4);
     let mut kinds = [Shape::Sphere, Shape::Cuboid, Shape::Cylinder, cone].map(ItemKind::Shape).to_vec();
     kinds.push(ItemKind::Mesh(0));
     for kind in kinds {

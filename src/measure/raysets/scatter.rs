@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn shapes_of_any_size_are_met() {
-        for shape in [Shape::Sphere, Shape::Disc, Shape::Cuboid, Shape::Cone { top: 0.2 }, Shape::HalfSpace] {
+        for shape in [Shape::Sphere, Shape::Disc, Shape::Cuboid, Shape::cone(0.2), Shape::HalfSpace] {
             let rays = &scatter(&scene_of(ItemKind::Shape(shape), None), 500, 2)[0];
             assert_eq!(rays.live_count(), 500, "{shape:?}");
             for i in 0..500 {

@@ -27,7 +27,7 @@ pub(super) fn intervals(solid: &Solid, org: DVec3, dir: DVec3) -> Vec<Span> {
         Solid::Polyhedron(polyhedron) => clipped(polyhedron, org, dir).into_iter().collect(),
         Solid::Torus { minor } => tori::torus(*minor, org, dir),
         Solid::EllipticTorus { reach, lean } => tori::elliptic_torus(*reach, *lean, org, dir),
-        Solid::Taper { x, y } => taper([*x, *y], org, dir),
+        Solid::Taper { x, y, .. } => taper([*x, *y], org, dir),
         Solid::Round { profile } => curved(*profile, false, org, dir),
         Solid::Trough { profile } => curved(*profile, true, org, dir),
         Solid::Mesh(mesh) => meshed(mesh, org, dir),
@@ -44,7 +44,7 @@ pub(super) fn normal(solid: &Solid, face: u32, p: DVec3) -> DVec3 {
         Solid::Torus { .. } => p - DVec3::new(p.x, p.y, 0.0).normalize_or(DVec3::X),
         Solid::EllipticTorus { reach, lean } => tori::elliptic_normal(*reach, *lean, p),
         Solid::Taper { .. } | Solid::Round { .. } | Solid::Trough { .. } if face > 0 => end(face),
-        Solid::Taper { x, y } => {
+        Solid::Taper { x, y, .. } => {
             // Of (x / a)^2 + (y / b)^2 - 1.
             let (a, b) = (1.0 + (x - 1.0) * p.z, 1.0 + (y - 1.0) * p.z);
             let along = -(p.x * p.x * (x - 1.0) / a.powi(3) + p.y * p.y * (y - 1.0) / b.powi(3));
@@ -303,7 +303,7 @@ mod tests {
     #[test]
     fn taper_by_hand() {
         // At z = 0.5 the semi-axes are 0.75 and 0.5.
-        let solid = Solid::Taper { x: 0.5, y: 0.0 };
+        let solid = Solid::Taper { x: 0.5, y: 0.0, is_mirrored: false };
         close(&ts(&solid, [-3.0, 0.0, 0.5], [1.0, 0.0, 0.0]), &[(2.25, 3.75)]);
         close(&ts(&solid, [0.0, -3.0, 0.5], [0.0, 1.0, 0.0]), &[(2.5, 3.5)]);
         close(&ts(&solid, [0.0, 0.0, 3.0], [0.0, 0.0, -1.0]), &[(2.0, 3.0)]);

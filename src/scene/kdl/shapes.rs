@@ -94,9 +94,13 @@ fn cone(fields: &Fields<'_, '_, '_>) -> Result<(Shape, DAffine3)> {
         return Err(fields.error_at("top", format!("`top` must not be negative, found {top}")));
     }
     let (from, to) = ends(fields)?;
-    // The canonical cone does not widen upwards.
-    let (from, to, wide, narrow) = if top > radius { (to, from, top, radius) } else { (from, to, radius, top) };
-    Ok((Shape::Cone { top: narrow / wide }, along(from, to, wide)))
+    if top <= radius {
+        return Ok((Shape::cone(top / radius), along(from, to, radius)));
+    }
+    // The canonical cone does not widen upwards: it is the mirror image of this one.
+    let mirror = DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0));
+    let shape = Shape::Cone { top: radius / top, is_mirrored: true };
+    Ok((shape, placed(along(from, to, top).matrix3 * mirror, to)))
 }
 
 fn ends(fields: &Fields<'_, '_, '_>) -> Result<(DVec3, DVec3)> {

@@ -64,9 +64,15 @@ fn shapes_have_their_size_and_place() {
         &[(X, [3.0, 0.0, 0.0]), (Z, [1.0, 0.0, 5.0])],
     );
     assert_item("cylinder { from 0 0 0; to 0 3 0 }", 0, Cylinder, &[(O, O), (Z, [0.0, 3.0, 0.0])]);
-    assert_item("cone radius=2 top=1", 0, Cone { top: 0.5 }, &[(X, [2.0, 0.0, 0.0]), (Z, Z)]);
+    assert_item("cone radius=2 top=1", 0, Shape::cone(0.5), &[(X, [2.0, 0.0, 0.0]), (Z, Z)]);
     // A cone that widens upwards stands on its head.
-    assert_item("cone radius=1 top=2 { to 0 0 4 }", 0, Cone { top: 0.5 }, &[(O, [0.0, 0.0, 4.0]), (Z, O)]);
+    let mirrored = Cone { top: 0.5, is_mirrored: true };
+    assert_item(
+        "cone radius=1 top=2 { to 0 0 4 }",
+        0,
+        mirrored,
+        &[(O, [0.0, 0.0, 4.0]), (Z, O), (X, [2.0, 0.0, 4.0]), (Y, [0.0, 2.0, 4.0])],
+    );
     assert_item("disc radius=3 { center 0 1 0; normal 0 0 2 }", 0, Disc, &[(X, [3.0, 1.0, 0.0])]);
     assert_item("plane { point 0 5 0; normal 0 2 0 }", 0, HalfSpace, &[(O, [0.0, 5.0, 0.0]), (Z, [0.0, 6.0, 0.0])]);
     assert_item("half-space { normal 0 0 -1 }", 0, HalfSpace, &[(Z, [0.0, 0.0, -1.0])]);

@@ -19,7 +19,7 @@ impl Solid {
                 let corner = DVec3::new(1.0 + reach, 1.0 + reach, *reach);
                 (-corner, corner)
             }
-            Self::Taper { x, y } => about_axis(x.max(1.0), y.max(1.0)),
+            Self::Taper { x, y, .. } => about_axis(x.max(1.0), y.max(1.0)),
             Self::Round { profile } => {
                 let reach = widest(profile);
                 about_axis(reach, reach)

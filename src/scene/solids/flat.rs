@@ -176,7 +176,7 @@ impl FlatTree {
 fn check(solid: &Solid) -> Result<(), String> {
     match solid {
         Solid::Shape(Shape::Disc) => Err("a disc has no inside".into()),
-        Solid::Shape(Shape::Cone { top }) if !(0.0..=1.0).contains(top) => {
+        Solid::Shape(Shape::Cone { top, .. }) if !(0.0..=1.0).contains(top) => {
             Err(format!("the top of a cone must be 0 to 1, found {top}"))
         }
         Solid::Torus { minor } if !(*minor > 0.0 && *minor <= 1.0) => {
@@ -187,7 +187,7 @@ fn check(solid: &Solid) -> Result<(), String> {
         {
             Err("the tube of an elliptic torus must not be a line, nor reach far beyond the middle of its ring".into())
         }
-        Solid::Taper { x, y } if !(*x >= 0.0 && *y >= 0.0 && x.is_finite() && y.is_finite()) => {
+        Solid::Taper { x, y, .. } if !(*x >= 0.0 && *y >= 0.0 && x.is_finite() && y.is_finite()) => {
             Err(format!("the top of a tapered solid must not be negative, found {x} and {y}"))
         }
         Solid::Round { profile } | Solid::Trough { profile } => {
@@ -313,13 +313,13 @@ mod tests {
     fn numbers_that_make_no_sense_are_refused() {
         let bad = [
             Solid::Shape(Shape::Disc),
-            Solid::Shape(Shape::Cone { top: 1.5 }),
+            Solid::Shape(Shape::cone(1.5)),
             Solid::Torus { minor: 0.0 },
             Solid::Torus { minor: f64::NAN },
             Solid::EllipticTorus { reach: 1.5, lean: 0.0 },
             Solid::EllipticTorus { reach: 0.5, lean: -1.0 },
             Solid::EllipticTorus { reach: 0.5, lean: f64::NAN },
-            Solid::Taper { x: -1.0, y: 1.0 },
+            Solid::Taper { x: -1.0, y: 1.0, is_mirrored: false },
             Solid::Round { profile: [1.0, -3.0, 1.0] },
             Solid::Trough { profile: [f64::NAN, 0.0, 0.0] },
         ];

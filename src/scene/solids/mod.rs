@@ -104,6 +104,8 @@ pub enum Solid {
         x: f64,
         /// Semi-axis along y at z = 1, >= 0.
         y: f64,
+        /// As of [`Shape::Cone`].
+        is_mirrored: bool,
     },
     /// x^2 + y^2 <= g(z), 0 <= z <= 1 with g(z) = g0 + g1 z + g2 z^2, which must not be negative there: paraboloids
     /// and hyperboloids with flat ends.

@@ -123,9 +123,12 @@ pub fn cone(from: DVec3, to: DVec3, from_radius: f64, to_radius: f64) -> Result<
 /// A base and a top without area, a height in the plane of the base.
 pub fn truncated_cone(v: DVec3, h: DVec3, a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> Result<Placed, String> {
     let (la, lb, lc, ld) = (a.length(), b.length(), c.length(), d.length());
-    // The end with area is the base: it becomes the unit circle.
-    let turned = la * lb < lc * ld;
-    let (v, h, [a, b], [la, lb, lc, ld]) = match turned {
+    let alike = |p: f64, q: f64| (p - q).abs() <= ALIKE * p.max(q);
+    let is_straight = alike(la, lc) && alike(lb, ld);
+    // The end with area is the base: it becomes the unit circle. Where that is the top, the canonical solid is the mirror
+    // image of what is wanted.
+    let is_mirrored = !is_straight && la * lb < lc * ld;
+    let (v, h, [a, b], [la, lb, lc, ld]) = match is_mirrored {
         false => (v, h, [a, b], [la, lb, lc, ld]),
         true => {
             let along = |own: DVec3, other: DVec3, length: f64| match own.try_normalize().or(other.try_normalize()) {
@@ -136,12 +139,12 @@ pub fn truncated_cone(v: DVec3, h: DVec3, a: DVec3, b: DVec3, c: DVec3, d: DVec3
         }
     };
     let (x, y) = (lc / la, ld / lb);
-    let solid = if (x - y).abs() > ALIKE * x.max(y) {
-        Solid::Taper { x, y }
-    } else if (1.0 - ALIKE..=1.0 + ALIKE).contains(&x) {
+    let solid = if is_straight {
         Solid::Shape(Shape::Cylinder)
+    } else if alike(x, y) {
+        Solid::Shape(Shape::Cone { top: x, is_mirrored })
     } else {
-        Solid::Shape(Shape::Cone { top: x })
+        Solid::Taper { x, y, is_mirrored }
     };
     Placed::new(solid, a, b, h, v)
 }
@@ -223,6 +226,16 @@ fn hyperbola(b: f64, c: f64) -> Result<[f64; 3], String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A mark that a cylinder does not have would turn its picture upside down.
+    #[test]
+    fn cones_that_are_hardly_any_are_cylinders_the_right_way_up() {
+        for grown in [1.0, 1.0 + 1e-9, 1.0 - 1e-9] {
+            let placed = cone(DVec3::ZERO, DVec3::Z * 2.0, 1.0, grown).unwrap();
+            assert!(matches!(placed.solid, Solid::Shape(Shape::Cylinder)), "{grown}: {placed:?}");
+            assert_eq!(placed.transform.transform_point3(DVec3::Z), DVec3::Z * 2.0);
+        }
+    }
 
     /// Points of the surface by its definition satisfy the canonical solid's equation.
     #[test]

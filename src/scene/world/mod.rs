@@ -86,7 +86,7 @@ impl Class {
             Shape::Disc => Self::Disc,
             Shape::Cuboid => Self::Cuboid,
             // A cone that does not narrow is a cylinder.
-            Shape::Cone { top } if *top >= 1.0 => Self::Cylinder,
+            Shape::Cone { top, .. } if *top >= 1.0 => Self::Cylinder,
             Shape::Cylinder => Self::Cylinder,
             Shape::Cone { .. } => Self::Cone,
         }

@@ -150,7 +150,7 @@ impl<S: Real> Primitives<S> {
         }
         let class = Class::of(shape);
         let record = match (class, shape) {
-            (Class::Cone, Shape::Cone { top }) => Placed::record::<S, Cone>(m, *top),
+            (Class::Cone, Shape::Cone { top, .. }) => Placed::record::<S, Cone>(m, *top),
             (Class::HalfSpace, _) => Placed::record::<S, HalfSpace>(m, 0.0),
             (Class::Disc, _) => Placed::record::<S, Disc>(m, 0.0),
             (Class::Cuboid, _) => Placed::record::<S, Cuboid>(m, 0.0),

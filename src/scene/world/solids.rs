@@ -42,13 +42,13 @@ fn form<'a>(solid: &'a Solid, planes: &'a [(DVec3, f64)]) -> Form<'a> {
         Solid::Shape(Shape::HalfSpace) => Form::HalfSpace,
         Solid::Shape(Shape::Cuboid) => Form::Cuboid,
         Solid::Shape(Shape::Cylinder) => Form::Cylinder,
-        Solid::Shape(Shape::Cone { top }) => Form::Cone(top),
+        Solid::Shape(Shape::Cone { top, .. }) => Form::Cone(top),
         // Discs are refused where trees are lowered.
         Solid::Shape(Shape::Sphere | Shape::Disc) => Form::Sphere,
         Solid::Polyhedron(_) => Form::Planes(planes),
         Solid::Torus { minor } => Form::Torus(minor),
         Solid::EllipticTorus { reach, lean } => Form::EllipticTorus([reach, lean]),
-        Solid::Taper { x, y } => Form::Taper([x, y]),
+        Solid::Taper { x, y, .. } => Form::Taper([x, y]),
         Solid::Round { profile } => Form::Round(profile),
         Solid::Trough { profile } => Form::Trough(profile),
     }
@@ -88,7 +88,7 @@ pub fn shape_normal(shape: &Shape, point: DVec3, face: u32) -> DVec3 {
         Shape::Disc => Disc::normal(point, face, 0.0),
         Shape::Cuboid => Cuboid::normal(point, face, 0.0),
         Shape::Cylinder => Cylinder::normal(point, face, 0.0),
-        Shape::Cone { top } => Cone::normal(point, face, top),
+        Shape::Cone { top, .. } => Cone::normal(point, face, top),
     }
 }
 
@@ -101,7 +101,7 @@ pub fn solid_normal(solid: &Solid, point: DVec3, face: u32) -> DVec3 {
         }
         Solid::Torus { .. } => DVec3::from(shape::torus_normal(point.to_array())),
         Solid::EllipticTorus { reach, lean } => shape::elliptic_torus_normal(point, [*reach, *lean]),
-        Solid::Taper { x, y } => shape::taper_normal(point, face, [*x, *y]),
+        Solid::Taper { x, y, .. } => shape::taper_normal(point, face, [*x, *y]),
         Solid::Round { profile } => shape::quadric::round_normal(point, face, *profile),
         Solid::Trough { profile } => shape::quadric::trough_normal(point, face, *profile),
         Solid::Mesh(mesh) if (face as usize) < mesh.triangles.len() => {
@@ -118,7 +118,7 @@ pub fn solid_normal(solid: &Solid, point: DVec3, face: u32) -> DVec3 {
 pub fn curved_normal<V: Lanes>(solid: &Solid, point: Lanes3<V>, face: u32) -> Option<Lanes3<V>> {
     match solid {
         Solid::Torus { .. } => Some(shape::torus_normal(point)),
-        Solid::Taper { x, y } if face == 0 => Some(shape::taper_side_normal(point, [*x, *y])),
+        Solid::Taper { x, y, .. } if face == 0 => Some(shape::taper_side_normal(point, [*x, *y])),
         _ => None,
     }
 }

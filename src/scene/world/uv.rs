@@ -15,7 +15,8 @@ use crate::scene::solids::Solid;
 /// Coordinates of a canonical shape at `point` of the face whose outward normal (not unit) is `normal`, both local.
 ///
 /// Sphere: v is the latitude, 0 at the south pole (local -z), 1 at the north pole. Cylinder and cone: v is z, 0 at the
-/// base; ends are flat faces. Half-space: x and y as they are.
+/// base; ends are flat faces. Of a cone that is a mirror image they are those of the original. Half-space: x and y as
+/// they are.
 pub fn of_shape(shape: &Shape, point: DVec3, normal: DVec3) -> [f64; 2] {
     match shape {
         Shape::Sphere => {
@@ -24,7 +25,8 @@ pub fn of_shape(shape: &Shape, point: DVec3, normal: DVec3) -> [f64; 2] {
         }
         Shape::HalfSpace => [point.x, point.y],
         Shape::Disc | Shape::Cuboid => flat(point, normal),
-        Shape::Cylinder | Shape::Cone { .. } => side(point, normal, [point.x, point.y]),
+        Shape::Cylinder => side(point, normal, [point.x, point.y]),
+        Shape::Cone { is_mirrored, .. } => tapered(point, normal, [point.x, point.y], *is_mirrored),
     }
 }
 
@@ -40,10 +42,10 @@ pub fn of_solid(solid: &Solid, point: DVec3, normal: DVec3, face: u32) -> [f64; 
             let out = point.x.hypot(point.y) - 1.0;
             [turn(point.x, point.y), turn(out, point.z)]
         }
-        Solid::Taper { x, y } => {
+        Solid::Taper { x, y, is_mirrored } => {
             // The angle of the circle that the ellipse at this height comes from.
             let [a, b] = [x, y].map(|end| (1.0 + (end - 1.0) * point.z).max(1e-300));
-            side(point, normal, [point.x / a, point.y / b])
+            tapered(point, normal, [point.x / a, point.y / b], *is_mirrored)
         }
         Solid::Round { .. } => side(point, normal, [point.x, point.y]),
         Solid::Trough { .. } | Solid::Polyhedron(_) => flat(point, normal),
@@ -61,6 +63,15 @@ fn turn(x: f64, y: f64) -> f64 {
 /// A round side with flat ends.
 fn side(point: DVec3, normal: DVec3, [x, y]: [f64; 2]) -> [f64; 2] {
     if normal.x == 0.0 && normal.y == 0.0 { flat(point, normal) } else { [turn(x, y), point.z] }
+}
+
+/// What narrows upwards, or is the mirror image of what widens.
+fn tapered(point: DVec3, normal: DVec3, circle: [f64; 2], is_mirrored: bool) -> [f64; 2] {
+    if !is_mirrored {
+        return side(point, normal, circle);
+    }
+    // Mirrored back; its round side faces outwards as before.
+    side(DVec3::new(point.x, point.y, 1.0 - point.z), DVec3::new(normal.x, normal.y, -normal.z), circle)
 }
 
 /// A flat face, by the axis its normal is closest to: of equal ones the last.
@@ -124,7 +135,7 @@ mod tests {
     /// A picture that repeats has no seam: on both sides of it u is next to a whole number.
     #[test]
     fn seams_join() {
-        for kind in [Shape::Sphere, Shape::Cylinder, Shape::Cone { top: 0.5 }] {
+        for kind in [Shape::Sphere, Shape::Cylinder, Shape::cone(0.5)] {
             let at = |y: f64| shape(kind, [0.8, y, 0.5], 0);
             let ([above, v], [below, w]) = (at(1e-9), at(-1e-9));
             assert!((0.0..1e-8).contains(&above) && (1.0 - 1e-8..1.0).contains(&below), "{above} {below}");
@@ -137,14 +148,19 @@ mod tests {
 
     #[test]
     fn round_sides_unroll_and_their_ends_are_flat() {
-        let tall = Shape::Cone { top: 0.25 };
+        let tall = Shape::cone(0.25);
         for (kind, x) in [(Shape::Cylinder, 1.0), (tall, 0.625)] {
             let point = DVec3::new(0.0, -x, 0.5);
             near(of_shape(&kind, point, DVec3::new(0.0, -1.0, 0.1)), [0.75, 0.5]);
             near(of_shape(&kind, DVec3::new(0.2, 0.1, 1.0), DVec3::Z), [0.6, 0.55]);
             near(of_shape(&kind, DVec3::new(0.2, 0.1, 0.0), -DVec3::Z), [0.4, 0.55]);
         }
-        let taper = Solid::Taper { x: 0.5, y: 0.25 };
+        // The mirror image of a funnel: the end at z = 0 was its upper one.
+        let funnel = Shape::Cone { top: 0.25, is_mirrored: true };
+        near(of_shape(&funnel, DVec3::new(0.0, -0.8125, 0.25), DVec3::new(0.0, -1.0, 0.1)), [0.75, 0.75]);
+        near(of_shape(&funnel, DVec3::new(0.2, 0.1, 0.0), -DVec3::Z), [0.6, 0.55]);
+        near(of_shape(&funnel, DVec3::new(0.2, 0.1, 1.0), DVec3::Z), [0.4, 0.55]);
+        let taper = Solid::Taper { x: 0.5, y: 0.25, is_mirrored: false };
         let point = DVec3::new(0.5 * 0.5f64.sqrt(), 0.25 * 0.5f64.sqrt(), 1.0);
         near(of_solid(&taper, point, DVec3::X, 0), [0.125, 1.0]);
         near(of_solid(&Solid::Torus { minor: 0.5 }, DVec3::new(0.0, 1.0, 0.5), DVec3::Z, 0), [0.25, 0.25]);
