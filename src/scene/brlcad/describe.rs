@@ -160,9 +160,9 @@ fn region_tree(database: &Database, region: &PlacedRegion, problems: &mut Vec<Pr
     let mut tree = SolidTree::new(region.path.clone());
     tree.id = region.region.id.into();
     tree.tolerance = TOLERANCE;
-    let mut stack: Vec<NodeId> = Vec::new();
+    let mut stack: Vec<Operand> = Vec::new();
     for &step in region.expression.steps() {
-        let node = match step {
+        let operand = match step {
             Step::Member(i) => {
                 let placed = region.solids[i as usize];
                 let object = &database.objects[placed.object as usize];
@@ -170,22 +170,23 @@ fn region_tree(database: &Database, region: &PlacedRegion, problems: &mut Vec<Pr
                     ObjectKind::Solid(solid) => lower::add(&mut tree, solid, &placed.transform),
                     _ => Err("not a solid".into()),
                 };
-                built.unwrap_or_else(|what| {
+                let node = built.unwrap_or_else(|what| {
                     if !problems.iter().rev().take(1000).any(|problem| problem.object == object.name) {
                         problems.push(Problem { object: object.name.clone(), place: object.place, what });
                     }
                     tree.op(NodeKind::Union(Vec::new()))
-                })
+                });
+                Operand { node, is_chain: false }
             }
-            Step::Empty => tree.op(NodeKind::Union(Vec::new())),
+            Step::Empty => Operand { node: tree.op(NodeKind::Union(Vec::new())), is_chain: false },
             operator => {
                 let (Some(b), Some(a)) = (stack.pop(), stack.pop()) else { continue };
                 apply(&mut tree, operator, a, b)
             }
         };
-        stack.push(node);
+        stack.push(operand);
     }
-    tree.root = stack.pop().unwrap_or_default();
+    tree.root = stack.pop().map_or(0, |operand| operand.node);
     if let Err(what) = FlatTree::new(&tree) {
         let place = region.solids.first().map_or(Place::Whole, |s| database.objects[s.object as usize].place);
         problems.push(Problem { object: region.path.clone(), place, what });
@@ -195,19 +196,36 @@ fn region_tree(database: &Database, region: &PlacedRegion, problems: &mut Vec<Pr
     tree
 }
 
-/// An operator on two nodes; a chain of one operator becomes one node with many operands.
-fn apply(tree: &mut SolidTree, operator: Step, a: NodeId, b: NodeId) -> NodeId {
-    match (operator, &mut tree.nodes[a as usize].kind) {
-        (Step::Union, NodeKind::Union(list)) if !list.is_empty() => list.push(b),
-        (Step::Intersection, NodeKind::Intersection(list)) | (Step::Difference, NodeKind::Difference(list)) => {
-            list.push(b)
+/// A value of the expression.
+#[derive(Clone, Copy)]
+struct Operand {
+    node: NodeId,
+    /// Whether [`apply`] made the node. A member may be an operation too, but one with a place of its own, which must not move
+    /// what stands beside the member.
+    is_chain: bool,
+}
+
+/// An operator on two values; a chain of one operator becomes one node with many operands.
+fn apply(tree: &mut SolidTree, operator: Step, a: Operand, b: Operand) -> Operand {
+    if a.is_chain {
+        match (operator, &mut tree.nodes[a.node as usize].kind) {
+            (Step::Union, NodeKind::Union(list))
+            | (Step::Intersection, NodeKind::Intersection(list))
+            | (Step::Difference, NodeKind::Difference(list)) => {
+                list.push(b.node);
+                return a;
+            }
+            _ => {}
         }
-        (Step::Union, _) => return tree.op(NodeKind::Union(vec![a, b])),
-        (Step::Intersection, _) => return tree.op(NodeKind::Intersection(vec![a, b])),
-        (Step::Difference, _) => return tree.op(NodeKind::Difference(vec![a, b])),
-        _ => return tree.op(NodeKind::Xor(vec![a, b])),
     }
-    a
+    let operands = vec![a.node, b.node];
+    let kind = match operator {
+        Step::Union => NodeKind::Union(operands),
+        Step::Intersection => NodeKind::Intersection(operands),
+        Step::Difference => NodeKind::Difference(operands),
+        _ => NodeKind::Xor(operands),
+    };
+    Operand { node: tree.op(kind), is_chain: true }
 }
 
 /// Problems as warnings, or as one error at the place of the first.
@@ -237,4 +255,64 @@ fn default_camera(bounds: Option<(DVec3, DVec3)>) -> CameraDescription {
     let (az, el) = DEFAULT_VIEW;
     let bounds = bounds.unwrap_or((DVec3::NEG_ONE, DVec3::ONE));
     View::around(bounds, az.to_radians(), el.to_radians()).camera("default", 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::transformed_bounds;
+    use crate::scene::brlcad::parse;
+
+    /// Box of the solids of the only region, whose tree is `tree`.
+    fn bounds(tree: &str) -> (DVec3, DVec3) {
+        let text = format!(
+            "title {{t}}\nunits mm\nput part part V {{0 0 0}} H {{10 0 0}} r_V 3 r_H 2\n\
+             put pipe pipe V0 {{0 0 0}} O0 6 I0 0 R0 5 V1 {{10 0 0}} O1 6 I1 0 R1 5\n\
+             put box arb8 V1 {{-5 -5 -5}} V2 {{-5 5 -5}} V3 {{-5 5 5}} V4 {{-5 -5 5}} V5 {{5 -5 -5}} V6 {{5 5 -5}} \
+             V7 {{5 5 5}} V8 {{5 -5 5}}\nput r comb region yes tree {tree}\n"
+        );
+        let database = parse(Path::new("d.asc"), text.as_bytes()).unwrap();
+        let description = describe(Path::new("d.asc"), "d", &database, &Options::default()).unwrap();
+        let flat = FlatTree::new(&description.solids[0]).unwrap();
+        let boxes = flat.leaves.iter().map(|leaf| {
+            let (lo, hi) = leaf.solid.bounds();
+            transformed_bounds(&leaf.to_tree, lo, hi)
+        });
+        boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap()
+    }
+
+    #[test]
+    fn the_place_of_a_member_moves_no_other_one() {
+        let moved = |name: &str, x: f64| format!("{{l {name} {{1 0 0 {x} 0 1 0 0 0 0 1 0 0 0 0 1}}}}");
+        for (name, end) in [("part", 112.0), ("pipe", 110.0)] {
+            let there = moved(name, 100.0);
+            // The box as it is, moved, and both twice.
+            for (other, low, twice) in
+                [("{l box}", -5.0, false), (&moved("box", -20.0), -25.0, false), ("{l box}", -5.0, true)]
+            {
+                let orders = [[&there, other], [other, &there]].map(|[a, b]| match twice {
+                    true => format!("{{u {{u {a} {b}}} {{u {a} {b}}}}}"),
+                    false => format!("{{u {a} {b}}}"),
+                });
+                for tree in orders {
+                    let (lo, hi) = bounds(&tree);
+                    let (low, high) = (DVec3::new(low, -5.0, -5.0), DVec3::new(end, 5.0, 5.0));
+                    assert!(
+                        (lo - low).abs().max_element() < 1e-9 && (hi - high).abs().max_element() < 1e-9,
+                        "{tree}: {lo} {hi}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_chain_of_one_operator_is_one_operation() {
+        let text = "title {t}\nunits mm\nput b ell V {0 0 0} A {1 0 0} B {0 1 0} C {0 0 1}\n\
+                    put r comb region yes tree {u {u {u {l b} {l b}} {l b}} {l b}}\n";
+        let database = parse(Path::new("d.asc"), text.as_bytes()).unwrap();
+        let description = describe(Path::new("d.asc"), "d", &database, &Options::default()).unwrap();
+        let tree = &description.solids[0];
+        assert!(matches!(&tree.nodes[tree.root as usize].kind, NodeKind::Union(list) if list.len() == 4));
+    }
 }
