@@ -3,10 +3,14 @@
 //! The triangle kernel is watertight but counts a shared edge for both its triangles, so crossings are not counted by parity:
 //! sorted by t they are walked with the triangles' orientation, which says what enters and what leaves. Where both happen
 //! within the tolerance the line only touches. In between a second entry or exit is the other triangle of an edge.
+//!
+//! A mesh may consist of several pieces, nested or overlapping: each is walked on its own, and the line is inside where it is in
+//! more pieces than voids.
 
 use glam::DVec3;
 
 use super::events::Events;
+use super::pieces::Pieces;
 use crate::bvh::{self, Preset};
 use crate::lanes::{LaneMask, Lanes, MAX_LANES, Real};
 use crate::ray::Packet;
@@ -18,12 +22,15 @@ use crate::shape::{Block, Span, Triangle, TriangleBlock};
 pub(super) struct Mesh<S> {
     tree: bvh::Tree<S>,
     blocks: Vec<TriangleBlock<S>>,
+    pieces: Pieces,
 }
 
 /// Working memory.
 #[derive(Debug, Default)]
 pub struct Crossings {
     list: Vec<Crossing>,
+    /// Where a lane enters and leaves the pieces.
+    ends: Vec<Crossing>,
     stack: Vec<(u32, u32)>,
 }
 
@@ -31,6 +38,7 @@ pub struct Crossings {
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
     lane: usize,
+    piece: u32,
     t: f64,
     enters: bool,
     triangle: u32,
@@ -46,8 +54,9 @@ struct Row<S> {
 impl<S: Real> Mesh<S> {
     /// Of the triangles' corners in the tree's space; triangles without an area are left out.
     pub fn new(triangles: impl Iterator<Item = [DVec3; 3]>) -> Self {
+        let triangles: Vec<[DVec3; 3]> = triangles.collect();
         let records: Vec<([S; 9], u32)> =
-            triangles.zip(0..).filter_map(|(corners, i)| Some((Triangle::record(corners).ok()?, i))).collect();
+            triangles.iter().zip(0..).filter_map(|(corners, i)| Some((Triangle::record(*corners).ok()?, i))).collect();
         let boxes: Vec<_> = records.iter().map(|(numbers, _)| Triangle::bounds(numbers)).collect();
         let (tree, leaves) = bvh::build(&boxes, &vec![0; boxes.len()], Preset::Balanced);
         let blocks = leaves.iter().map(|leaf| {
@@ -58,12 +67,12 @@ impl<S: Real> Mesh<S> {
             }
             block
         });
-        Self { tree, blocks: blocks.collect() }
+        Self { tree, blocks: blocks.collect(), pieces: Pieces::new(&triangles) }
     }
 
     /// Bytes of triangles and nodes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.tree.nodes[..]) + size_of_val(&self.blocks[..])
+        size_of_val(&self.tree.nodes[..]) + size_of_val(&self.blocks[..]) + self.pieces.bytes()
     }
 
     /// Adds the boundaries in `lanes`; the faces are the triangles' numbers.
@@ -77,29 +86,23 @@ impl<S: Real> Mesh<S> {
         events: &mut Events<S>,
     ) {
         self.cross(packet, lanes, crossings);
-        crossings.list.sort_by(|a, b| a.lane.cmp(&b.lane).then(a.t.total_cmp(&b.t)).then(a.triangle.cmp(&b.triangle)));
+        let Crossings { list, ends, .. } = crossings;
+        let by_t = |a: &Crossing, b: &Crossing| a.t.total_cmp(&b.t).then(a.triangle.cmp(&b.triangle));
+        list.sort_by(|a, b| a.lane.cmp(&b.lane).then(a.piece.cmp(&b.piece)).then(by_t(a, b)));
         let mut rows: Vec<Row<S>> = Vec::new();
-        for of_lane in crossings.list.chunk_by(|a, b| a.lane == b.lane) {
+        for of_lane in list.chunk_by(|a, b| a.lane == b.lane) {
             let lane = of_lane[0].lane;
             let apart = eps.lane(lane).to_f64();
-            let mut filled = 0;
-            let mut entered: Option<Crossing> = None;
-            let mut rest = of_lane;
-            while let Some(first) = rest.first() {
-                let (group, after) = rest.split_at(rest.partition_point(|c| c.t <= first.t + apart));
-                rest = after;
-                let enters = group.iter().find(|c| c.enters);
-                let leaves = group.iter().find(|c| !c.enters);
-                match (entered, enters, leaves) {
-                    (None, Some(enter), None) => entered = Some(*enter),
-                    (Some(enter), None, Some(leave)) => {
-                        put(&mut rows, filled, lane, [enter, *leave]);
-                        filled += 1;
-                        entered = None;
-                    }
-                    _ => {}
-                }
+            ends.clear();
+            for of_piece in of_lane.chunk_by(|a, b| a.piece == b.piece) {
+                walk(of_piece, self.pieces.is_void(of_piece[0].piece), apart, ends);
             }
+            ends.sort_by(by_t);
+            let mut filled = 0;
+            unite(ends, apart, |span| {
+                put(&mut rows, filled, lane, span);
+                filled += 1;
+            });
         }
         for row in &rows {
             let [t_in, t_out] = [0, 1].map(|k| V::load(&row.t[k]));
@@ -111,7 +114,7 @@ impl<S: Real> Mesh<S> {
 
     /// Lists all crossings of the lines in `lanes`.
     fn cross<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>, lanes: u32, crossings: &mut Crossings) {
-        let Crossings { list, stack } = crossings;
+        let Crossings { list, stack, .. } = crossings;
         list.clear();
         stack.clear();
         if self.tree.nodes.is_empty() {
@@ -151,9 +154,55 @@ impl<S: Real> Mesh<S> {
                 hit &= hit - 1;
                 let dir = DVec3::from_array(line.dir.map(|x| x.lane(lane).to_f64()));
                 let enters = normal.dot(dir) < 0.0;
-                list.push(Crossing { lane, t: found.t.lane(lane).to_f64(), enters, triangle });
+                let (piece, t) = (self.pieces.of(triangle), found.t.lane(lane).to_f64());
+                list.push(Crossing { lane, piece, t, enters, triangle });
             }
         });
+    }
+}
+
+/// Crossings that are no farther apart than that, in turn.
+fn groups(mut rest: &[Crossing], apart: f64) -> impl Iterator<Item = &[Crossing]> {
+    std::iter::from_fn(move || {
+        let first = rest.first()?;
+        let (group, after) = rest.split_at(rest.partition_point(|c| c.t <= first.t + apart));
+        rest = after;
+        Some(group)
+    })
+}
+
+/// Adds where a line passes through one piece to `ends`, pair by pair; a void is entered where its surface is left.
+fn walk(of_piece: &[Crossing], is_void: bool, apart: f64, ends: &mut Vec<Crossing>) {
+    let mut entered: Option<Crossing> = None;
+    for group in groups(of_piece, apart) {
+        let enters = group.iter().find(|c| c.enters != is_void);
+        let leaves = group.iter().find(|c| c.enters == is_void);
+        match (entered, enters, leaves) {
+            (None, Some(enter), None) => entered = Some(*enter),
+            (Some(enter), None, Some(leave)) => {
+                ends.extend([enter, *leave]);
+                entered = None;
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Where a line is in more pieces than voids; `ends` by t. Pieces that touch within the tolerance are not left in between.
+fn unite(ends: &[Crossing], apart: f64, mut found: impl FnMut([Crossing; 2])) {
+    let mut depth = 0;
+    let mut entered: Option<Crossing> = None;
+    for group in groups(ends, apart) {
+        depth += group.iter().map(|c| if c.enters { 1 } else { -1 }).sum::<i32>();
+        match (entered, depth > 0) {
+            (None, true) => entered = group.iter().find(|c| c.enters).copied(),
+            (Some(enter), false) => {
+                // The depth has fallen, so one of these leaves.
+                group.iter().filter(|c| !c.enters).take(1).for_each(|leave| found([enter, *leave]));
+                entered = None;
+            }
+            _ => {}
+        }
     }
 }
 

@@ -11,6 +11,7 @@ mod leaf;
 mod mesh;
 mod nearest;
 mod operands;
+mod pieces;
 mod prune;
 mod sole;
 mod solid;

@@ -77,6 +77,47 @@ fn a_polysolid_is_one_too() {
     same(&world(&format!("title {{t}}\nunits mm\n{new}\nput r comb region yes tree {{l body}}\n")), &old);
 }
 
+/// Every boundary along x through (0, `y`, `z`), from x = -50.
+fn boundaries(world: &World<f64>, y: f64, z: f64) -> Vec<f64> {
+    let (mut found, mut hits, mut from) = (Vec::new(), Hits::new(0), 0.0);
+    loop {
+        let mut rays = Rays::new(1);
+        rays.set(0, [-50.0, y, z], [1.0, 0.0, 0.0], from, f64::INFINITY);
+        engine::<f64>("auto").unwrap().intersect(world, &rays, &mut hits, &mut Scratch::default(), None);
+        if !hits.is_hit(0) || found.len() > 9 {
+            return found;
+        }
+        found.push(hits.t[0]);
+        from = hits.t[0] + 0.001;
+    }
+}
+
+/// Pieces may be wound as they like: one inside another is no void, and those that overlap are what is in any of them.
+#[test]
+fn pieces_of_a_bot_are_united() {
+    let cases: [(&[(f64, f64)], [f64; 2]); 4] = [
+        (&[(0.0, 10.0)], [40.0, 60.0]),
+        (&[(0.0, 10.0), (0.0, 4.0)], [40.0, 60.0]),
+        (&[(0.0, 10.0), (0.0, -4.0)], [40.0, 60.0]),
+        (&[(0.0, 10.0), (8.0, 10.0)], [40.0, 68.0]),
+    ];
+    for (cubes, want) in cases {
+        let corner =
+            |k: usize, (centre, half): (f64, f64)| CORNERS[k].map(|x| centre + if x > 0 { half } else { -half });
+        let vertices = list(cubes.iter().flat_map(|&cube| (0..8).map(move |k| corner(k, cube))));
+        let quads = (0..cubes.len()).flat_map(|i| FACES.map(|face| face.map(|k| k + 8 * i)));
+        let faces = list(quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]));
+        let bot = format!("put body bot mode volume orient no V {{ {vertices}}} F {{ {faces}}}");
+        let world = world(&format!("title {{t}}\nunits mm\n{bot}\nput r comb region yes tree {{l body}}\n"));
+        // Through edges of triangles, and beside them.
+        for (y, z) in [(1.0, 1.0), (1.0, 2.0), (-1.5, 0.5)] {
+            let got = boundaries(&world, y, z);
+            let near = got.len() == 2 && got.iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-9);
+            assert!(near, "{cubes:?} at {y} {z}: {got:?}");
+        }
+    }
+}
+
 #[test]
 fn surfaces_and_open_bots_are_named_and_left_out_if_asked() {
     let described = |mode: &str, faces: &str, lenient: bool| {

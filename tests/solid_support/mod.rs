@@ -36,7 +36,7 @@ pub fn cuboid(lo: DVec3, hi: DVec3) -> Placed {
 }
 
 /// The cube [-1, 1]^3, two triangles a side.
-fn cube_mesh() -> Mesh {
+pub fn cube_mesh() -> Mesh {
     let positions = (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * 2.0 - 1.0);
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();

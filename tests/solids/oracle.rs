@@ -1,5 +1,7 @@
 //! Random trees of solids: all engines give the same bits, and the oracle explains every answer.
 
+use std::sync::Arc;
+
 use crate::common;
 use crate::solid_support;
 
@@ -9,11 +11,12 @@ use lanecast::lanes::Real;
 use lanecast::ray::{Hits, Rays};
 use lanecast::reference::{EngineHit, Oracle, OracleRay, Tally};
 use lanecast::scene::description::{Description, Precision, Shape};
-use lanecast::scene::solids::{NodeKind, Placed, Solid, SolidTree};
+use lanecast::scene::mesh::Mesh;
+use lanecast::scene::solids::{self, NodeKind, Placed, Solid, SolidTree};
 use lanecast::scene::world::{Preset, World};
 use lanecast::trace::{Engines, Scratch};
 use rayon::prelude::*;
-use solid_support::{KINDS, cuboid, grow, leaf, rays, scene};
+use solid_support::{KINDS, cube_mesh, cuboid, grow, leaf, rays, scene};
 
 fn oracle_ray<S: Real>(rays: &Rays<S>, i: usize) -> OracleRay {
     let v = |p: [S; 3]| DVec3::from_array(p.map(Real::to_f64));
@@ -148,6 +151,41 @@ fn many_leaves<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, n:
     };
     let sum = sum_over::<S>(precision, seeds, n, solid);
     assert!(sum.hits > sum.rays / 4, "only {} of {} rays hit", sum.hits, sum.rays);
+}
+
+/// Boxes in one mesh: beside, across and inside each other, some of them turned inwards, alone and cut by a ball.
+fn meshes_of_boxes<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, n: usize) {
+    let boxes = |seed: u64| {
+        let mut r = Random(seed);
+        let mut mesh = Mesh::default();
+        for i in 0..2 + r.below(3) {
+            let one = cube_mesh();
+            let at = mesh.positions.len() as u32;
+            let (centre, half) = (r.in_cube(), DVec3::new(0.4 + r.unit(), 0.4 + r.unit(), 0.4 + r.unit()));
+            let is_void = i > 0 && r.below(3) == 0;
+            mesh.positions.extend(one.positions.iter().map(|&p| centre + p * if is_void { -0.7 * half } else { half }));
+            mesh.triangles.extend(one.triangles.iter().map(|t| t.map(|k| k + at)));
+        }
+        let mut tree = SolidTree::new("boxes");
+        tree.root = tree.solid(Placed { solid: Solid::Mesh(Arc::new(mesh)), transform: DAffine3::IDENTITY });
+        if r.below(2) == 0 {
+            let ball = tree.solid(solids::ball(r.in_cube(), 0.5 + r.unit()).unwrap());
+            tree.root = tree.op(NodeKind::Difference(vec![tree.root, ball]));
+        }
+        tree
+    };
+    let sum = sum_over::<S>(precision, seeds, n, boxes);
+    assert!(sum.hits > sum.rays / 8, "only {} of {} rays hit", sum.hits, sum.rays);
+}
+
+#[test]
+fn meshes_of_boxes_f64() {
+    meshes_of_boxes::<f64>(Precision::F64, 0..size().0, size().1);
+}
+
+#[test]
+fn meshes_of_boxes_f32() {
+    meshes_of_boxes::<f32>(Precision::F32, 0..size().0, size().1);
 }
 
 /// Trees whose rays run in the faces of meshes, meet tips and edges of no width, and rims edge-on: among all of the long

@@ -8,13 +8,11 @@ use glam::DVec3;
 use super::super::margin::point_to_triangle;
 use super::super::shapes;
 use super::super::spans::{self, Crossing, Span};
+use super::meshes::meshed;
 use super::tori;
 use crate::scene::description::Shape;
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::{Polyhedron, Solid};
-
-/// Crossings of a mesh closer than this relative to coordinates are one.
-const SAME_EDGE: f64 = 1e-13;
 
 /// Entry and exit of each interval, in order; ends may be infinite.
 pub(super) fn intervals(solid: &Solid, org: DVec3, dir: DVec3) -> Vec<Span> {
@@ -85,36 +83,6 @@ pub(super) fn blur(mesh: &Mesh, org: DVec3, dir: DVec3) -> f64 {
         .filter(|corners| shapes::triangle(*corners, org, dir).is_some())
         .map(|corners| shapes::blur(corners, org, dir))
         .fold(0.0, f64::max)
-}
-
-/// The inside of a closed mesh, by the number of surfaces around a point: every crossing adds or takes one, and a crossing of
-/// an edge, seen by the triangles on both its sides, counts once.
-fn meshed(mesh: &Mesh, org: DVec3, dir: DVec3) -> Vec<Span> {
-    let mut ends: Vec<(f64, bool, u32)> = Vec::new();
-    for i in 0..mesh.triangles.len() {
-        let corners = mesh.corners(i);
-        if let Some(hit) = shapes::triangle(corners, org, dir).filter(|_| shapes::is_proper(corners)) {
-            ends.push((hit.t, hit.ng.dot(dir) < 0.0, i as u32));
-        }
-    }
-    ends.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
-    let size = mesh.bounds().map_or(0.0, |(lo, hi)| lo.abs().max(hi.abs()).max_element()) + org.abs().max_element();
-    let apart = SAME_EDGE * size / dir.length();
-    let mut spans: Vec<Span> = Vec::new();
-    let mut entered: Option<(f64, u32)> = None;
-    for group in ends.chunk_by(|a, b| b.0 - a.0 <= apart) {
-        let (t, _, face) = group[0];
-        let way = |enters: bool| group.iter().any(|e| e.1 == enters);
-        match (entered, way(true), way(false)) {
-            (None, true, false) => entered = Some((t, face)),
-            (Some((t_in, face_in)), false, true) => {
-                spans.push(Span::new(t_in, t, face_in, face));
-                entered = None;
-            }
-            _ => {}
-        }
-    }
-    spans
 }
 
 /// Where `n . p <= d` with `at` = n . org - d and `speed` = n . dir.

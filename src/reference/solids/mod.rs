@@ -2,6 +2,7 @@
 //! neighbouring ends (Roth, "Ray casting for modeling solids", 1982).
 
 mod leaf;
+mod meshes;
 mod tori;
 pub(super) mod verdict;
 

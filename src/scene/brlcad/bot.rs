@@ -13,7 +13,7 @@ use crate::scene::solids::flat::closed;
 const SOLID: u8 = 2;
 
 /// The solid inside the triangles `faces` between `vertices`. Their order of corners may be anything: neighbours are
-/// turned the same way, and every connected piece outwards (a piece inside another one, a void, is filled).
+/// turned the same way, and every connected piece outwards: what is in any piece is inside, so one inside another is no void.
 ///
 /// # Errors
 /// In words: it is a surface or a plate; it is not closed; its triangles cannot be turned the same way.
