@@ -97,7 +97,8 @@ mod tests {
 
     #[test]
     fn nested_and_overlapping_cubes_by_hand() {
-        let cases: [(&[(f64, f64)], &[(f64, f64)]); 6] = [
+        type Pairs = &'static [(f64, f64)];
+        let cases: [(Pairs, Pairs); 6] = [
             (&[(0.0, 10.0)], &[(40.0, 60.0)]),
             (&[(0.0, 10.0), (0.0, 4.0)], &[(40.0, 60.0)]),
             (&[(0.0, 10.0), (0.0, -4.0)], &[(40.0, 46.0), (54.0, 60.0)]),
