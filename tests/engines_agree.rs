@@ -3,6 +3,7 @@
 mod common;
 
 use lanecast::ray::{Counters, Hits, INVALID_ID, PAD, Rays};
+use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::world::{Preset, World};
 use lanecast::trace::{Engines, Scratch};
 
@@ -179,4 +180,108 @@ fn f32_short_rays_of_neighbours() {
 #[test]
 fn f64_short_rays_of_neighbours() {
     short_rays_of_neighbours::<f64>();
+}
+
+/// The world of a scene file and of what else it reads.
+fn written<S: Engines>(files: &[(&str, &str)]) -> World<S> {
+    let dir = tempfile::tempdir().expect("a folder");
+    files.iter().for_each(|(name, text)| std::fs::write(dir.path().join(name), text).expect("a file"));
+    let scene = load(&dir.path().join(files[0].0).to_string_lossy(), &LoadOptions::default()).expect("a scene");
+    World::compile(&scene, Preset::Balanced).expect("a world")
+}
+
+/// Two solids in one place: the first has every hit, also where a hit lies at the very end of a segment, from however far it is seen.
+fn twins<S: Engines>() {
+    for solid in
+        ["intersection { box; sphere { center 0.5 0 0; radius 1 } }", "difference { box; sphere { radius 1.2 } }"]
+    {
+        let world = written::<S>(&[("twins.kdl", &format!("{solid}\n{solid}\n"))]);
+        let mut random = common::Random(3);
+        for distance in [10.0, 1e3, 1e5] {
+            let mut rays = Rays::<S>::new(4000);
+            for i in 0..rays.len() {
+                let (org, at) = (random.in_cube().normalize() * distance, random.in_cube());
+                let exact = |v: glam::DVec3| v.as_vec3().to_array().map(|x| S::from_f64(f64::from(x)));
+                rays.set(i, exact(org), exact(at - org), S::ZERO, S::INFINITY);
+            }
+            let hits = same_bits_of(&world, &rays);
+            assert!(hits > 1000, "{hits} of {solid} from {distance}");
+            let (mut found, mut scratch) = (Hits::<S>::default(), Scratch::default());
+            S::engines()[1].intersect(&world, &rays, &mut found, &mut scratch, None);
+            for i in 0..rays.len() {
+                assert!(!found.is_hit(i) || found.prim[i] < 2, "ray {i} hits the second of {solid} from {distance}");
+                rays.t_max[i] = if found.is_hit(i) { found.t[i] } else { S::INFINITY };
+            }
+            assert_eq!(same_bits_of(&world, &rays), hits, "segments are closed: {solid} from {distance}");
+        }
+    }
+}
+
+#[test]
+fn twins_and_ends_of_segments() {
+    twins::<f32>();
+    twins::<f64>();
+}
+
+/// A line in the lower face of a triangle's box, whose interval begins at 0 there and says nothing: what lies behind the start is no hit at 0.
+#[test]
+fn what_lies_behind_is_not_at_the_start() {
+    let boat = "v 0 -1 0\nv 0 1 0\nv 1 0 5\nv -1 0 5\nf 1 2 3\nf 2 1 4\nf 1 3 4\nf 2 4 3\n\
+                v -1 -1 6\nv 1 -1 6\nv -1 1 6\nv 1 1 6\nv -1 -1 7\nv 1 -1 7\nv -1 1 7\nv 1 1 7\n\
+                f 5 7 8\nf 5 8 6\nf 9 10 12\nf 9 12 11\nf 5 6 10\nf 5 10 9\nf 7 11 12\nf 7 12 8\nf 5 9 11\nf 5 11 7\nf 6 8 12\nf 6 12 10\n";
+    let world =
+        written::<f32>(&[("m.kdl", "union { mesh \"boat.obj\"; sphere { center 50 0 0 } }"), ("boat.obj", boat)]);
+    let one = written::<f32>(&[("one.obj", "v 0 -1 0\nv 0 1 0\nv 1 0 5\nf 1 2 3\n")]);
+    let mut hits = Hits::default();
+    for x in [-0.001, 0.0, 0.001] {
+        let mut rays = Rays::<f32>::new(16);
+        (0..16).for_each(|i| rays.set(i, [x, 0.5, 3.0], [0.0, 0.0, 1.0], 0.0, f32::INFINITY));
+        assert_eq!(same_bits_of(&world, &rays), 16);
+        f32::engines()[1].intersect(&world, &rays, &mut hits, &mut Scratch::default(), None);
+        assert_eq!(hits.t[0], 3.0, "the cube, from x = {x}");
+        (0..16).for_each(|i| rays.t_min[i] = -1e-3);
+        assert_eq!(same_bits_of(&one, &rays), 0, "the triangle is three units behind x = {x}");
+    }
+}
+
+/// Numbers beyond reason cost their neighbours nothing and come to an end.
+#[test]
+fn rays_beyond_reason() {
+    let world = written::<f32>(&[("m.kdl", "union { half-space; sphere }")]);
+    let mut rays = Rays::<f32>::new(16);
+    for i in 0..16 {
+        let (far, slow) = [(1e8, 1e-37), (1e30, 1e-20), (1e12, 1e-33), (3.0, 1.0)][i % 4];
+        rays.set(i, [far, 0.0, -5.0], [slow, 0.0, slow], 0.0, f32::INFINITY);
+    }
+    same_bits_of(&world, &rays);
+    let placed = "define \"d\" { sphere; box { center 3 0 0 } }\ninstance \"d\" { scale 0.001; shear zx=0.5 }";
+    let world = written::<f32>(&[("m.kdl", placed)]);
+    for huge in [1e20, 1e37, 3e38] {
+        let (mut random, mut rays) = (common::Random(8), Rays::<f32>::new(1000));
+        for i in 0..1000 {
+            let (org, at) = (random.in_cube() * 0.02, random.in_cube() * 0.003);
+            let dir = if i % 8 == 0 { [huge, huge, 0.0] } else { (at - org).as_vec3().to_array() };
+            rays.set(i, org.as_vec3().to_array(), dir, 0.0, f32::INFINITY);
+        }
+        assert!(same_bits_of(&world, &rays) > 100);
+    }
+}
+
+/// A light in the plane of a wall: rays towards it that start in that plane, too, and have the wall behind them.
+#[test]
+fn rays_in_the_plane_of_a_wall_and_its_light() {
+    let wall = written::<f32>(&[("wall.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n")]);
+    let light = [5.0, 0.25, 0.0];
+    let starts =
+        [[2.0, 0.3125, 0.0], [2.0, 0.3125, 1.0], [4.0, -3.0, 0.5], [1.5, 1.0, 2.0], [3.0, 3.0, -1.0], [3.0, 0.5, 0.0]];
+    let mut rays = Rays::<f32>::new(1024);
+    for i in 0..rays.len() {
+        let start = starts[i % starts.len()];
+        rays.set(i, start, [0, 1, 2].map(|a| light[a] - start[a]), 0.0, 1.0);
+    }
+    let mut occluded = Vec::new();
+    for engine in f32::engines() {
+        engine.occluded(&wall, &rays, &mut occluded, &mut Scratch::default(), None);
+        assert!(occluded.iter().all(|x| *x == 0), "{}", engine.name());
+    }
 }

@@ -294,7 +294,8 @@ pub(super) fn tolerance<V: Lanes>(packet: &Packet<V>, size: V::Scalar, least: V:
     let distance = (reach * V::constant(ROUNDINGS * V::Scalar::EPSILON.to_f64())).fast_max(V::splat(least));
     // One over the largest component of the direction.
     let [x, y, z] = packet.rcp.map(V::abs);
-    distance * x.fast_min(y).fast_min(z)
+    // Infinite, nothing would be told apart, and an end at minus infinity would come to no number.
+    (distance * x.fast_min(y).fast_min(z)).fast_min(V::splat(V::Scalar::MAX))
 }
 
 /// Where boundaries of a leaf may lie whose box is met in `interval`.

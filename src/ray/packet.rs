@@ -110,11 +110,16 @@ impl<V: Lanes> Packet<V> {
     /// Of the lanes with a segment, those that can hit something.
     #[inline(always)]
     fn live(org: Lanes3<V>, dir: Lanes3<V>, segment: V::Mask) -> u32 {
-        let most = V::splat(V::Scalar::MAX);
-        let finite = |v: Lanes3<V>| v[0].abs().cmp_le(most) & v[1].abs().cmp_le(most) & v[2].abs().cmp_le(most);
         let zero = V::constant(0.0);
         let points = zero.cmp_lt(dir[0].abs()) | zero.cmp_lt(dir[1].abs()) | zero.cmp_lt(dir[2].abs());
         (finite(org) & finite(dir) & points & segment).bits()
+    }
+
+    /// Lanes whose origin and direction are finite. Of others nothing is known, and what is asked of all lanes together would not be
+    /// either.
+    #[inline(always)]
+    pub fn finite_lanes(&self) -> u32 {
+        (finite(self.org) & finite(self.dir)).bits()
     }
 
     /// The same rays in an instance's space; `floor` is where they enter the instance's box.
@@ -146,6 +151,13 @@ impl<V: Lanes> Packet<V> {
             shear: pick(self.shear),
         }
     }
+}
+
+/// Where all three numbers are.
+#[inline(always)]
+fn finite<V: Lanes>(v: Lanes3<V>) -> V::Mask {
+    let most = V::splat(V::Scalar::MAX);
+    v[0].abs().cmp_le(most) & v[1].abs().cmp_le(most) & v[2].abs().cmp_le(most)
 }
 
 /// What a kernel found: lanes where one primitive is hit, and where.

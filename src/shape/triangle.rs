@@ -217,7 +217,7 @@ impl Triangle {
         if flat {
             let (zero, flat) = (V::constant(0.0), Self::along_a_face(packet.dir));
             end = V::select(interval.far.cmp_eq(zero) & flat, found.t, end);
-            let behind = found.t.cmp_lt(zero) & zero.cmp_le(packet.t_min);
+            let behind = found.t.cmp_lt(zero);
             found.hit = found.hit & !(flat & interval.near.cmp_eq(zero) & behind);
         }
         found.t = packet.t_floor.fast_max(interval.near.fast_max(found.t.fast_min(end)));

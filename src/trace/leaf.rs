@@ -75,7 +75,10 @@ pub fn enter<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
     let interval = Interval::of(packet, instance.bounds.lo, instance.bounds.hi);
     let meets = crate::lanes::LaneMask::bits(interval.meets(packet.t_min, query.hit.t));
-    (packet.into_local(&instance.to_local, interval.near), lanes & meets)
+    let local = packet.into_local(&instance.to_local, interval.near);
+    // A direction may overflow on the way in.
+    let live = lanes & meets & local.finite_lanes();
+    (local, live)
 }
 
 #[inline(always)]

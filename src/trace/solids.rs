@@ -58,7 +58,9 @@ fn sweep<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
     // Lent to the sweep, which calls back with the query.
     let mut scratch = query.stack.solids.take().unwrap_or_default();
-    let limit = query.hit.t;
+    // Boundaries are moved into the box before they count: where all of it is within the limit, so are they.
+    let within = interval.far.cmp_le(query.hit.t);
+    let limit = V::select(within, V::splat(V::Scalar::MAX), query.hit.t);
     let effort =
         csg::sweep(&placed.solid, packet, (wanted, &interval), limit, Depth::FrontFirst, &mut scratch, |boundary| {
             let found = candidate(packet, &interval, boundary.t, boundary.face, boundary.turned);
@@ -91,7 +93,7 @@ fn span<V: Lanes, const ANY: bool, const COUNT: bool>(
     let Some(span) = sole.span(solid, packet, wanted, &interval) else { return };
     let boundary = |t: V, face: V| {
         let found = candidate(packet, &interval, t, face, 0);
-        Candidate { hit: found.hit & t.cmp_le(query.hit.t), ..found }
+        Candidate { hit: found.hit & found.t.cmp_le(query.hit.t), ..found }
     };
     let (enters, leaves) = (boundary(span.t_in, span.face_in), boundary(span.t_out, span.face_out));
     let nearest = |of_enters: V, of_leaves: V| V::select(enters.hit, of_enters, of_leaves);

@@ -95,7 +95,8 @@ fn boundaries(world: &World<f64>, y: f64, z: f64) -> Vec<f64> {
 /// Pieces may be wound as they like: one inside another is no void, and those that overlap are what is in any of them.
 #[test]
 fn pieces_of_a_bot_are_united() {
-    let cases: [(&[(f64, f64)], [f64; 2]); 4] = [
+    type Cubes = &'static [(f64, f64)];
+    let cases: [(Cubes, [f64; 2]); 4] = [
         (&[(0.0, 10.0)], [40.0, 60.0]),
         (&[(0.0, 10.0), (0.0, 4.0)], [40.0, 60.0]),
         (&[(0.0, 10.0), (0.0, -4.0)], [40.0, 60.0]),

@@ -112,7 +112,7 @@ fn test<
     let id = |i: usize| Id { inst: batch.inst[i], prim: batch.id[i] };
     let unsteady = if ANY { 0 } else { planes.unsteady };
     // What the plain test is not for comes last: which test is next is never a surprise.
-    let odd = planes.wild | if BEHIND { planes.flat } else { 0 };
+    let odd = planes.wild | if BEHIND || END { planes.flat } else { 0 };
     let mut tested = Tested::default();
     again.len = 0;
     if listing.by_groups {
