@@ -19,9 +19,7 @@ mod void;
 use std::marker::PhantomData;
 
 use crate::error::{Error, Result, nearest_name};
-use crate::lanes::{Lanes, Real, f32x16, f64x8};
-#[cfg(not(test))]
-use crate::lanes::{f32x4, f32x8, f64x2, f64x4};
+use crate::lanes::{Lanes, Pair, Real, f32x4, f32x8, f32x16, f64x2, f64x4, f64x8};
 use crate::ray::{Counters, HitPacket, Hits, Packet, Pencil, Rays};
 use crate::scene::world::{Compiles, World};
 pub use all::{Stretch, stretches};
@@ -98,8 +96,7 @@ pub trait Engine<S: Real>: Sync {
     );
 }
 
-/// A scalar type with its list of engines, of which the tests of the library's parts need some widths only: the others, which are the
-/// same source, take minutes to compile and are run by tests of the whole program. Lists are never taken over into other crates, as the compiler would do with such short
+/// A scalar type with its list of engines. Lists are never taken over into other crates, as the compiler would do with such short
 /// functions: what is listed would be compiled there once more.
 pub trait Engines: Compiles {
     /// `f32` or `f64`.
@@ -122,9 +119,7 @@ impl Engines for f32 {
         &[
             &Generic::<f32, false>("brute", PhantomData),
             &Generic::<f32, true>("scalar", PhantomData),
-            #[cfg(not(test))]
             &Generic::<f32x4, true>("packet4", PhantomData),
-            #[cfg(not(test))]
             &Generic::<f32x8, true>("packet8", PhantomData),
             &Generic::<f32x16, true>("packet16", PhantomData),
             &stream::Stream::<f32x16>(PhantomData),
@@ -145,7 +140,7 @@ impl Engines for f32 {
 
 /// Vectors of rays of the stream kernel in f64: two registers of AVX-512 or of AVX2.
 #[cfg(target_feature = "avx512f")]
-type Doubles = crate::lanes::Pair<f64x8>;
+type Doubles = Pair<f64x8>;
 #[cfg(not(target_feature = "avx512f"))]
 type Doubles = f64x8;
 
@@ -157,13 +152,10 @@ impl Engines for f64 {
         &[
             &Generic::<f64, false>("brute", PhantomData),
             &Generic::<f64, true>("scalar", PhantomData),
-            #[cfg(not(test))]
             &Generic::<f64x2, true>("packet2", PhantomData),
-            #[cfg(not(test))]
             &Generic::<f64x4, true>("packet4", PhantomData),
             &Generic::<f64x8, true>("packet8", PhantomData),
-            #[cfg(not(test))]
-            &Generic::<crate::lanes::Pair<f64x8>, true>("packet16", PhantomData),
+            &Generic::<Pair<f64x8>, true>("packet16", PhantomData),
             &stream::Stream::<Doubles>(PhantomData),
         ]
     }

@@ -140,10 +140,10 @@ mod tests {
         d.materials.push(Material { diffuse: DVec3::ZERO, emission: DVec3::splat(3.0), ..Material::default() });
         let shape =
             |shape, transform, material| Item { transform, material: Some(material), kind: ItemKind::Shape(shape) };
-        d.groups[0].items.push(shape(Shape::HalfSpace, DAffine3::IDENTITY, 0));
+        d.groups[0].items.push(shape(Shape::HalfSpace, DAffine3::IDENTITY, 1));
         let spheres = [TAU / 16.0, -TAU / 16.0].map(|angle: f64| {
             let at = DVec3::new(angle.cos(), angle.sin(), 1.0).normalize() * DISTANCE;
-            shape(Shape::Sphere, DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::splat(0.4)), at), 1)
+            shape(Shape::Sphere, DAffine3::from_mat3_translation(DMat3::from_diagonal(DVec3::splat(0.4)), at), 2)
         });
         d.groups.push(Group { name: "pair".into(), items: spheres.to_vec() });
         for i in 0..4 {
