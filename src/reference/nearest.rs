@@ -183,7 +183,29 @@ fn on_edge(a: DVec2, b: DVec2) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Random;
+
+    /// Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014: the oracle shares nothing with the engines, so it has its
+    /// own here.
+    struct Random(u64);
+
+    impl Random {
+        /// In [0, 1).
+        fn unit(&mut self) -> f64 {
+            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        }
+
+        /// In [-1, 1).
+        fn signed(&mut self) -> f64 {
+            2.0 * self.unit() - 1.0
+        }
+
+        fn cube(&mut self) -> DVec3 {
+            DVec3::new(self.signed(), self.signed(), self.signed())
+        }
+    }
 
     const SHAPES: [(Shape, u32); 6] = [
         (Shape::Sphere, 1),

@@ -92,7 +92,9 @@ fn refusals_say_what_is_expected() {
     for (line, what) in [
         ("render scene.kdl -o a.exr --frames 3..1", "expected A..B"),
         ("render scene.kdl -o a.exr --frames 3", "expected A..B"),
-        ("render scene.kdl -o a.exr --resume", "--frames"),
+        ("render scene.kdl -o a.exr --resume --noise 0.1", "--resume goes with a fixed number of samples"),
+        ("render scene.kdl -o a.exr --resume --time-limit 5", "--resume goes with a fixed number of samples"),
+        ("render scene.kdl -o a.exr --resume --preview term", "--resume goes with a fixed number of samples"),
         ("render scene.kdl -o a.exr --frames 1..2 --set frame=7", "--set frame: --frames sets it"),
         ("render scene.obj -o a.exr --frames 1..2", "--frames: scene.obj has no parameters"),
     ] {
