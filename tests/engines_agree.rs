@@ -190,6 +190,41 @@ fn written<S: Engines>(files: &[(&str, &str)]) -> World<S> {
     World::compile(&scene, Preset::Balanced).expect("a world")
 }
 
+/// Two solids in one place: the first has every hit, also where a hit lies at the very end of a segment, from however far it is seen.
+fn twins<S: Engines>() {
+    for solid in [
+        "intersection { box; sphere { center 0.5 0 0; radius 1 } }",
+        "union { box; sphere { center 0.5 0 0; radius 0.5 } }",
+        "difference { box; sphere { center 0.5 0 0; radius 0.4 } }",
+    ] {
+        let world = written::<S>(&[("twins.kdl", &format!("{solid}\n{solid}\n"))]);
+        let mut random = common::Random(3);
+        for distance in [10.0, 1e3, 1e5] {
+            let mut rays = Rays::<S>::new(4000);
+            for i in 0..rays.len() {
+                let (org, at) = (random.in_cube().normalize() * distance, random.in_cube());
+                let exact = |v: glam::DVec3| v.as_vec3().to_array().map(|x| S::from_f64(f64::from(x)));
+                rays.set(i, exact(org), exact(at - org), S::ZERO, S::INFINITY);
+            }
+            let hits = same_bits_of(&world, &rays);
+            assert!(hits > 400, "{hits} of {solid} from {distance}");
+            let (mut found, mut scratch) = (Hits::<S>::default(), Scratch::default());
+            S::engines()[1].intersect(&world, &rays, &mut found, &mut scratch, None);
+            for i in 0..rays.len() {
+                assert!(!found.is_hit(i) || found.prim[i] < 2, "ray {i} hits the second of {solid} from {distance}");
+                rays.t_max[i] = if found.is_hit(i) { found.t[i] } else { S::INFINITY };
+            }
+            assert_eq!(same_bits_of(&world, &rays), hits, "segments are closed: {solid} from {distance}");
+        }
+    }
+}
+
+#[test]
+fn twins_and_ends_of_segments() {
+    twins::<f32>();
+    twins::<f64>();
+}
+
 /// A line in the lower face of a triangle's box, whose interval begins at 0 there and says nothing: what lies behind the start is no hit at 0.
 #[test]
 fn what_lies_behind_is_not_at_the_start() {

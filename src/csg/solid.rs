@@ -122,7 +122,7 @@ impl<S: Real> Solid<S> {
 
     /// Difference of t below which two boundaries of a lane are one. It depends on the lane's line only.
     #[inline(always)]
-    pub(super) fn tolerance<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>) -> V {
+    pub fn tolerance<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>) -> V {
         tolerance(packet, self.size, self.least)
     }
 

@@ -4,7 +4,7 @@
 #![allow(unsafe_code, reason = "instructions no crate offers as safe functions")]
 
 use super::{LaneMask, Lanes, Real};
-use wide::{f32x4, f32x8, f32x16, u8x16, u16x8, u32x16};
+use wide::{f32x4, f32x8, f32x16, u16x8, u32x16};
 
 /// The lower and the upper half.
 #[inline(always)]
@@ -255,6 +255,8 @@ pub fn transpose_bits<const K: usize>(planes: [u32; K]) -> [u8; 16] {
 #[cfg(any(test, not(all(target_feature = "avx512bw", target_feature = "avx512vl"))))]
 #[inline(always)]
 fn transpose_bits_by_bytes<const K: usize>(planes: [u32; K]) -> [u8; 16] {
+    use wide::u8x16;
+
     const PLACES: u8x16 = u8x16::new([1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128]);
     let eight = |byte: u32| u64::from(byte & 0xff) * 0x0101_0101_0101_0101;
     let numbers = planes.iter().enumerate().fold(u8x16::ZERO, |all, (k, &plane)| {

@@ -58,9 +58,9 @@ fn sweep<V: Lanes, const ANY: bool, const COUNT: bool>(
     }
     // Lent to the sweep, which calls back with the query.
     let mut scratch = query.stack.solids.take().unwrap_or_default();
-    // Boundaries are moved into the box before they count: where all of it is within the limit, so are they.
-    let within = interval.far.cmp_le(query.hit.t);
-    let limit = V::select(within, V::splat(V::Scalar::MAX), query.hit.t);
+    // Boundaries are moved into the box before they count, by no more than the tolerance: what is looked at reaches beyond the
+    // limit, so that the hit at which a segment ends, or that of another solid in the same place, is seen by every order of tests.
+    let limit = placed.solid.tolerance(packet).mul_add(V::constant(4.0), query.hit.t);
     let effort =
         csg::sweep(&placed.solid, packet, (wanted, &interval), limit, Depth::FrontFirst, &mut scratch, |boundary| {
             let found = candidate(packet, &interval, boundary.t, boundary.face, boundary.turned);

@@ -283,6 +283,12 @@ impl<S: Real> World<S> {
         &self.objects[self.instances[0].object as usize]
     }
 
+    /// The box of what trees hold, in world space: all but what has no bounds.
+    #[inline(always)]
+    pub fn tree_bounds(&self) -> &Aabb<S> {
+        if self.is_single_object() { &self.first_object().tree.bounds } else { &self.top.bounds }
+    }
+
     /// Whether something has no bounds, so that no tree holds it.
     pub fn has_unbounded(&self) -> bool {
         if !self.is_single_object() {

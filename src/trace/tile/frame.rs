@@ -137,7 +137,7 @@ impl Frame {
 
 /// Largest coordinate of a box as seen from the apex.
 #[inline(always)]
-fn reach(bounds: &Aabb<f32>, apex: [f32; 3]) -> f32 {
+pub fn reach(bounds: &Aabb<f32>, apex: [f32; 3]) -> f32 {
     let [x, y, z] = each(|a| (bounds.lo[a] - apex[a]).abs().max((bounds.hi[a] - apex[a]).abs()));
     x.max(y).max(z)
 }

@@ -171,8 +171,7 @@ impl Groups {
         world: &World<f32>,
     ) -> bool {
         self.many = !world.is_single_object();
-        let scene = if self.many { &world.top.bounds } else { &world.first_object().tree.bounds };
-        let Some(frame) = Frame::of::<N>(bundle, groups, scene) else { return false };
+        let Some(frame) = Frame::of::<N>(bundle, groups, world.tree_bounds()) else { return false };
         self.frame = frame;
         if self.many {
             self.inst[..N * SET].fill([NO_SLOT; 16]);

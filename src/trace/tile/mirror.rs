@@ -10,6 +10,7 @@ use glam::{DMat3, DVec3};
 
 use super::bundle::{Bundle, Shared, groups, largest, load3};
 use super::columns::Columns;
+use super::frame::reach;
 use super::{GROUPS, HALF_ULP, Job, Mask, SET, SETS, V, select};
 use crate::lanes::chosen::merge_lists;
 use crate::lanes::words::{greatest, positions};
@@ -19,9 +20,13 @@ use crate::scene::world::Names;
 use crate::trace::output::Output;
 use crate::trace::stream;
 
-/// Lines may pass the point at this many half ulps of the start's largest coordinate and of the distance, by each axis: what
-/// the rounding of starts and directions leaves, and well below the bound that answers keep.
+/// Lines may pass the point at this many half ulps of the start's largest coordinate and of the distance (up to [`FAR`]), by each
+/// axis: what the rounding of starts and directions leaves, and well below the bound that answers keep.
 const CLOSE: [f32; 2] = [4.0, 1.5];
+
+/// Distances of the point count up to this many times the scene's largest coordinate: what directions round to grows with the
+/// distance, the bound that answers keep does not.
+const FAR: f32 = 8.0;
 
 /// The same for the first guess, which is made from one group.
 const FIRST: [f32; 2] = [512.0; 2];
@@ -58,18 +63,20 @@ struct Search<'a> {
     all: Bundle<'a>,
     /// Per group: lanes.
     free: [u32; GROUPS],
+    /// Distance of the point that counts at most.
+    far: f32,
     /// Groups that were tried.
     tried: usize,
     failures: u32,
 }
 
 impl<'a> Search<'a> {
-    /// In the block that starts with ray `first`; `None` if a few groups that are far from each other say that it is not worth
-    /// it.
-    fn new(rays: &'a Rays<f32>, first: usize) -> Option<Self> {
+    /// In the block that starts with ray `first`, in a scene of coordinates up to `reach`; `None` if a few groups that are far
+    /// from each other say that it is not worth it.
+    fn new(rays: &'a Rays<f32>, first: usize, reach: f32) -> Option<Self> {
         let all = Bundle::unsorted(rays, first, groups::<SETS>(rays, first));
         // One chance less than later: what does not look like a mirror mostly is none.
-        let mut search = Self { rays, all, free: [0; GROUPS], tried: 0, failures: 1 };
+        let mut search = Self { rays, all, free: [0; GROUPS], far: FAR * reach, tried: 0, failures: 1 };
         // The groups that are tried if there is no mirror.
         let columns = Columns::of(rays);
         (1..FAILURES as usize - 1).for_each(|k| columns.prefetch(first / V::N + k * JUMP % GROUPS));
@@ -185,7 +192,7 @@ impl<'a> Search<'a> {
         let rest = across(rest, dot(rest, dir) * rcp);
         let (miss, distance) = (largest(rest), largest(way));
         let [near, far] = close.map(|x| V::splat(x * HALF_ULP));
-        let most = near.mul_add(largest(org), far * distance);
+        let most = near.mul_add(largest(org), far * distance.fast_min(V::splat(self.far)));
         // By all axes together, and with what the differences round.
         let slack = V::splat(4.0 * HALF_ULP).mul_add(distance, V::constant(3.0) * miss);
         let passes = miss.cmp_le(most) & V::constant(0.0).cmp_lt(before);
@@ -216,7 +223,8 @@ impl Job<'_> {
     /// Traces the rays of a block that are of such points; the others are left over. False if there are no points.
     #[inline(never)]
     pub fn mirrored<const EXACT: bool, const COUNT: bool>(&mut self, first: usize) -> bool {
-        let Some(mut search) = Search::new(self.rays, first) else { return false };
+        let reach = reach(self.world.tree_bounds(), [0.0; 3]);
+        let Some(mut search) = Search::new(self.rays, first, reach) else { return false };
         let mut done = [0; GROUPS];
         let len = search.all.len;
         while let Some(mut bundle) = search.bundle() {
