@@ -414,6 +414,22 @@ fn mirror_rays() {
     }
 }
 
+/// A mirror under small things, seen from so far that the lines it throws back pass the eye's image by more than answers may be wrong.
+#[test]
+fn mirrors_of_distant_eyes() {
+    let mut r = Random(77);
+    let mut floor = cube();
+    floor.positions.iter_mut().for_each(|p| *p = DVec3::new(6.0 * p.x, 6.0 * p.y, 0.1 * p.z - 5.0));
+    let world = compile(vec![floor, needles(400, &mut r), soup(400, &mut r)]);
+    for distance in [30.0, 100.0, 300.0, 1e3, 1e4] {
+        let eye = DVec3::new(0.1, 0.4, 0.9).normalize() * distance;
+        let primary = camera(eye, DVec3::ZERO, 4.0 / distance, 256);
+        let thrown = mirrored(&world, &primary);
+        assert!(thrown.live_count() > 20_000, "{}", thrown.live_count());
+        assert_eq!(differences(&world, &thrown), (0, 0), "from {distance}");
+    }
+}
+
 /// Blocks on a lattice, seen from points that lie in the planes of many of their sides: those are seen edge-on.
 #[test]
 fn eyes_in_the_planes_of_triangles() {

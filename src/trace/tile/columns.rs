@@ -15,7 +15,7 @@ use crate::ray::{Packet, Rays};
 pub const AHEAD: usize = 8;
 
 /// Groups of the next block that the memory is asked for at each step of a tile's way.
-const AT_ONCE: usize = 2;
+const AT_ONCE: usize = 4;
 
 /// The rays of a group and their ends.
 #[derive(Clone, Copy, Debug)]
@@ -101,6 +101,16 @@ impl<'a> Next<'a> {
     #[inline(always)]
     pub fn asked(&self) -> usize {
         self.group.get()
+    }
+
+    /// Asks for those of the sample that the block's frame is made of and that were not asked for yet.
+    #[inline(always)]
+    pub fn ask_sample(&self) {
+        let (asked, first) = (self.group.get(), self.end - GROUPS);
+        if asked < self.end && asked < self.columns.t_min.len() {
+            let not_yet = (asked - first).div_ceil(SETS);
+            (not_yet..SET).for_each(|k| self.columns.prefetch(first + SETS * k));
+        }
     }
 
     /// Asks for the next few.

@@ -320,6 +320,7 @@ impl<'a> Job<'a> {
         let exact = Exact { bundle, world: self.world, object: self.world.first_object(), next };
         walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         self.memory.groups.asked = exact.next.asked();
+        exact.next.ask_sample();
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
             if !self.past {
                 self.output.prefetch(bundle.first + (g + AHEAD) * V::N);
