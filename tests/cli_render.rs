@@ -137,6 +137,25 @@ fn scenes_without_anything_are_pictures() {
 
 /// Half of what shines and half of the black behind it: by every engine, also by one whose arithmetic hangs on which rays go together, and
 /// whatever planes are asked for beside.
+/// Light goes through two faces of a box, however thin it is and from however far it is seen.
+#[test]
+fn thin_boxes_have_two_faces() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let camera = "camera \"m\" { eye 0.3 0.2 1000; look-at 0 0 0; fov 0.05 }";
+    let look = "ambient 0\nmaterial \"p\" { diffuse 0; emission 1; opacity 0.5 }";
+    let shape = "box material=\"p\" { size 4 4 0.001 }\n";
+    std::fs::write(dir.path().join("m.kdl"), format!("{camera}\n{look}\n{shape}")).expect("a scene");
+    for engine in ["scalar", "stream", "tile"] {
+        let line = format!("render m.kdl -o out.exr --size 32x32 --spp 64 --engine {engine} --precision f32");
+        let ended = lanecast(dir.path(), &line.split(' ').collect::<Vec<_>>());
+        assert_eq!(ended.code, Some(0), "{line}: {}", ended.err);
+        let film = exr::read(&dir.path().join("out.exr")).expect("a picture");
+        let alpha = film.f32_plane("A").expect("A");
+        let mean = alpha.iter().map(|x| f64::from(*x)).sum::<f64>() / alpha.len() as f64;
+        assert!((mean - 0.75).abs() < 0.01, "{engine}: {mean}");
+    }
+}
+
 #[test]
 fn half_opaque_surfaces_are_half_seen() {
     let dir = tempfile::tempdir().expect("a temporary folder");

@@ -267,6 +267,15 @@ fn rays_beyond_reason() {
         }
         assert!(same_bits_of(&world, &rays) > 100);
     }
+    let quad = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n";
+    let placed = "define \"q\" { mesh \"q.obj\" }\ninstance \"q\" { scale 1e-6 }\ninstance \"q\" { scale 1e-6; translate 8e-6 0 0 }";
+    let world = written::<f32>(&[("m.kdl", placed), ("q.obj", quad)]);
+    let mut rays = Rays::<f32>::new(64);
+    for i in 0..64 {
+        let dir = if i % 16 == 0 { [0.0, -8e31, -1e33] } else { [0.0, (i % 16) as f32 * 1e-7 - 8e-7, -1e-5] };
+        rays.set(i, [(i / 32) as f32 * 8e-6, 0.0, 1e-5], dir, 0.0, f32::INFINITY);
+    }
+    assert!(same_bits_of(&world, &rays) > 50);
 }
 
 /// A light in the plane of a wall: rays towards it that start in that plane, too, and have the wall behind them.

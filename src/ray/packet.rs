@@ -112,14 +112,14 @@ impl<V: Lanes> Packet<V> {
     fn live(org: Lanes3<V>, dir: Lanes3<V>, segment: V::Mask) -> u32 {
         let zero = V::constant(0.0);
         let points = zero.cmp_lt(dir[0].abs()) | zero.cmp_lt(dir[1].abs()) | zero.cmp_lt(dir[2].abs());
-        (finite(org) & finite(dir) & points & segment).bits()
+        (finite(org, dir) & points & segment).bits()
     }
 
     /// Lanes whose origin and direction are finite. Of others nothing is known, and what is asked of all lanes together would not be
     /// either.
     #[inline(always)]
     pub fn finite_lanes(&self) -> u32 {
-        (finite(self.org) & finite(self.dir)).bits()
+        finite(self.org, self.dir).bits()
     }
 
     /// The same rays in an instance's space; `floor` is where they enter the instance's box.
@@ -153,11 +153,12 @@ impl<V: Lanes> Packet<V> {
     }
 }
 
-/// Where all three numbers are.
+/// Where all numbers are finite: zero times each is zero then, and so is their sum.
 #[inline(always)]
-fn finite<V: Lanes>(v: Lanes3<V>) -> V::Mask {
-    let most = V::splat(V::Scalar::MAX);
-    v[0].abs().cmp_le(most) & v[1].abs().cmp_le(most) & v[2].abs().cmp_le(most)
+fn finite<V: Lanes>([x, y, z]: Lanes3<V>, [dx, dy, dz]: Lanes3<V>) -> V::Mask {
+    let zero = V::constant(0.0);
+    let sum = [y, z, dx, dy, dz].into_iter().fold(x * zero, |sum, v| v.mul_add(zero, sum));
+    sum.cmp_eq(zero)
 }
 
 /// What a kernel found: lanes where one primitive is hit, and where.

@@ -430,6 +430,55 @@ fn mirrors_of_distant_eyes() {
     }
 }
 
+/// A floor seen from its own height, by rays in its plane and a little off it.
+#[test]
+fn eyes_at_floor_height() {
+    let mut floor = Mesh::default();
+    for i in 0..48 {
+        floor.positions.push(DVec3::new(f64::from(i % 6) * 0.4 - 1.0, 0.0, f64::from(i / 6) / 3.5 - 1.0));
+        let (column, row) = (i % 6, i / 6);
+        if column < 5 && row < 7 {
+            floor.triangles.extend([[i, i + 1, i + 7], [i, i + 7, i + 6]]);
+        }
+    }
+    let world = compile(vec![floor]);
+    let mut r = Random(41);
+    for case in 0..24 {
+        let eye = [r.unit() * 2.0 - 1.0, 0.0, [3.0, 1.0, 0.3][case % 3]].map(|x| x as f32);
+        let mut rays = Rays::new(2048);
+        for i in 0..rays.len() {
+            let off = [0.0, 1e-17, -1e-12, 1e-8, -1e-6, 0.2][r.bits() as usize % 6];
+            let dir = [r.unit() * 2.0 - 1.0, off, -1.0].map(|x| x as f32);
+            rays.set(i, eye, dir, 0.0, f32::INFINITY);
+        }
+        assert_eq!(differences(&world, &rays), (0, 0), "case {case}");
+    }
+}
+
+/// Segments that start or end at minus zero, as hits do that lie in the start.
+#[test]
+fn segments_to_minus_zero() {
+    let mut r = Random(43);
+    let world = compile(vec![soup(300, &mut r)]);
+    for case in 0..8 {
+        let mut rays = camera(DVec3::new(0.1, 0.2, 9.0), DVec3::ZERO, 0.4, 32);
+        for i in 0..rays.len() {
+            match (r.bits() % 64, case % 4) {
+                (0, 0) | (1, 3) => rays.t_max[i] = -0.0,
+                (_, 1 | 3) => rays.t_min[i] = -0.0,
+                _ => {}
+            }
+        }
+        if case % 4 > 0 {
+            rays.t_min[5 * case] = 0.5;
+        }
+        assert_eq!(differences(&world, &rays), (0, 0), "case {case}");
+        let hits = &mut Hits::default();
+        find("tile").intersect(&world, &rays, hits, &mut Scratch::default(), None);
+        assert!(hits.hit_count() > 200, "{}", hits.hit_count());
+    }
+}
+
 /// Blocks on a lattice, seen from points that lie in the planes of many of their sides: those are seen edge-on.
 #[test]
 fn eyes_in_the_planes_of_triangles() {

@@ -81,6 +81,8 @@ impl<S: Real> Inside<S> {
             let interval = Interval::of(&packet, instance.bounds.lo, instance.bounds.hi);
             let meets = interval.meets(packet.t_min, t).bits() & lanes;
             let local: Packet<V> = packet.brought_in(&instance.to_local, interval.near, from.sheared);
+            // A direction may overflow on the way in.
+            let meets = meets & local.finite_lanes();
             self.chunk.take(at, &local, meets);
             if self.chunk.mixed {
                 self.chunk.take_octants(at, &local);

@@ -286,7 +286,10 @@ impl Batch {
         farthest.store(&mut planes.farthest);
 
         let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
-        planes.wild = in_front & !V::splat(LEAST_VOLUME).cmp_le(size).bits();
+        // Seen from its own plane a triangle has no depth that its corners would not belie.
+        let products = dot(map3(normal, V::abs), map3(p[0], V::abs));
+        let tells = V::splat(LEAST_VOLUME).cmp_le(size) & (products * V::splat(LEAST_DISTANCE)).cmp_lt(size);
+        planes.wild = in_front & !tells.bits();
         // Weights are for the nearest hit only.
         planes.unsteady = if ANY { 0 } else { in_front & !steady(groups, p, (&edges, &eps), high).bits() };
         let eps = eps[0].fast_max(eps[1]).fast_max(eps[2]);

@@ -188,11 +188,14 @@ impl<'a> Bundle<'a> {
         let i = self.first / V::N + g;
         match self.source {
             Source::Batch(rays) => Columns::of(rays).get(i),
-            Source::Pencil(pencil, _) => {
-                let (org, dir) = (map3(self.apex, V::splat), pencil.directions(i).map(V::new));
-                Segments { org, dir, t_min: V::constant(0.0), t_max: V::splat(f32::INFINITY) }
-            }
+            Source::Pencil(pencil, _) => self.aimed(pencil.directions(i).map(V::new)),
         }
+    }
+
+    /// Rays of a pencil in the directions `dir`.
+    #[inline(always)]
+    pub fn aimed(&self, dir: Lanes3<V>) -> Segments {
+        Segments { org: map3(self.apex, V::splat), dir, t_min: V::constant(0.0), t_max: V::splat(f32::INFINITY) }
     }
 
     /// Parameters of the two ends of a group's segments.

@@ -35,7 +35,8 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
             };
             let tame = exact.bundle.tame[g];
             let lanes = tame & !groups.done(g, tame);
-            if let Some((packet, t_max, lanes)) = enter(exact, inst, g, limit, (lanes, sheared)) {
+            let segments = groups.segments(exact.bundle, g);
+            if let Some((packet, t_max, lanes)) = enter(exact, inst, &segments, limit, (lanes, sheared)) {
                 visitors.put(count, (&packet, sheared), t_max, lanes);
                 of[count] = g;
                 count += 1;

@@ -120,6 +120,8 @@ pub struct Groups {
     pub cap: f32,
     /// How far hits may be from where the tile's arithmetic puts them, on top of what grows with distance; scaled.
     pub slack: f32,
+    /// Of a pencil: groups whose rays' directions are where other tiles have their starts ([`Group::start`]).
+    pub aimed: u64,
     /// The frame.
     pub frame: Frame,
     /// From this group of the batch on the memory was not asked for rays yet.
@@ -154,6 +156,7 @@ impl Default for Groups {
             wide: 0.0,
             cap: 0.0,
             slack: 0.0,
+            aimed: 0,
             frame: Frame::default(),
             asked: 0,
         }
@@ -172,7 +175,7 @@ impl Groups {
     ) -> bool {
         self.many = !world.is_single_object();
         let Some(frame) = Frame::of::<N>(bundle, groups, world.tree_bounds()) else { return false };
-        self.frame = frame;
+        (self.frame, self.aimed) = (frame, 0);
         if self.many {
             self.inst[..N * SET].fill([NO_SLOT; 16]);
         }

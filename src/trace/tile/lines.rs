@@ -48,6 +48,8 @@ impl Lines {
     pub fn of(frame: &Frame, bundle: &Bundle, segments: &Segments, tame: u32) -> Self {
         let (zero, one, infinite) = (V::constant(0.0), V::constant(1.0), V::splat(f32::INFINITY));
         let Segments { org, dir, t_min, t_max } = *segments;
+        // Where a segment starts or ends at zero, the depth there is infinite, not its negative.
+        let [t_min, t_max] = [t_min + zero, t_max + zero];
         let apex = map3(bundle.apex, V::splat);
         let direction = match bundle.shared {
             Shared::Start | Shared::Behind => dir,

@@ -184,7 +184,8 @@ pub fn decide<const ANY: bool, const MANY: bool>(
         let blocks = &exact.world.objects[object as usize].triangles;
         let (at, place) = ((batch.slot[i] >> 3) as usize, (batch.slot[i] & 7) as usize);
         block.set(0, blocks[at].get(place), id.prim);
-        match shapes::enter(exact, id.inst, g, V::splat(f32::INFINITY), (exact.bundle.tame[g], true)) {
+        let segments = exact.bundle.segments(g);
+        match shapes::enter(exact, id.inst, &segments, V::splat(f32::INFINITY), (exact.bundle.tame[g], true)) {
             Some(entered) => entered,
             None => return false,
         }

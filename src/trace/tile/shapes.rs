@@ -2,6 +2,7 @@
 //! at a time, by the common formula. What it finds becomes a depth in the frame, and is weighed against the tile's other
 //! hits as their own are.
 
+use super::bundle::{Bundle, Source};
 use super::columns::Segments;
 use super::exact::Exact;
 use super::groups::Groups;
@@ -17,17 +18,33 @@ use crate::scene::world::Object;
 use crate::trace::leaf;
 use crate::trace::query::{Query, Stack};
 
-/// The rays of a group in the space of an instance, their ends or `limit`, whichever is nearer, and those of `lanes` that meet its
-/// box; `None` if none does. `sheared`: see [`Packet::prepared`].
+impl Groups {
+    /// The rays of a group and their ends: those of a pencil are made once, however many instances they go into.
+    #[inline(always)]
+    pub fn segments(&mut self, bundle: &Bundle, g: usize) -> Segments {
+        match bundle.source {
+            Source::Batch(_) => bundle.segments(g),
+            Source::Pencil(..) if self.aimed >> g & 1 != 0 => bundle.aimed(self.of[g].start),
+            Source::Pencil(..) => {
+                let segments = bundle.segments(g);
+                (self.of[g].start, self.aimed) = (segments.dir, self.aimed | 1 << g);
+                segments
+            }
+        }
+    }
+}
+
+/// The rays of a group, `segments`, in the space of an instance, their ends or `limit`, whichever is nearer, and those of `lanes`
+/// that meet its box; `None` if none does. `sheared`: see [`Packet::prepared`].
 #[inline(always)]
 pub fn enter(
     exact: &Exact,
     inst: u32,
-    g: usize,
+    segments: &Segments,
     limit: V,
     (lanes, sheared): (u32, bool),
 ) -> Option<(Packet<V>, V, u32)> {
-    let Segments { org, dir, t_min, t_max } = exact.bundle.segments(g);
+    let Segments { org, dir, t_min, t_max } = *segments;
     // What is no number limits nothing.
     let t_max = limit.fast_min(t_max);
     let instance = &exact.world.instances[inst as usize];
@@ -37,7 +54,13 @@ pub fn enter(
     let packet = Packet::unsheared(org, dir, t_min);
     let interval = Interval::of(&packet, instance.bounds.lo, instance.bounds.hi);
     let lanes = interval.meets(t_min, t_max).bits() & lanes;
-    (lanes != 0).then(|| (packet.brought_in(&instance.to_local, interval.near, sheared), t_max, lanes))
+    if lanes == 0 {
+        return None;
+    }
+    let local = packet.brought_in(&instance.to_local, interval.near, sheared);
+    // A direction may overflow on the way in.
+    let lanes = lanes & local.finite_lanes();
+    (lanes != 0).then_some((local, t_max, lanes))
 }
 
 /// Tests a leaf of an instance's shapes against `wanted` groups of `N` sets.
@@ -57,7 +80,8 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
         rest &= rest - 1;
         let tame = exact.bundle.tame[g];
         let lanes = tame & !groups.done(g, tame);
-        let Some((packet, t_max, lanes)) = enter(exact, inst, g, V::splat(f32::INFINITY), (lanes, true)) else {
+        let segments = groups.segments(exact.bundle, g);
+        let Some((packet, t_max, lanes)) = enter(exact, inst, &segments, V::splat(f32::INFINITY), (lanes, true)) else {
             continue;
         };
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), stack, counters);
