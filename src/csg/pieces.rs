@@ -16,7 +16,7 @@ pub(super) struct Pieces {
     is_void: Vec<bool>,
 }
 
-/// Sets of triangles, each set a tree towards its representative.
+/// Sets of triangles, each set a tree towards its lowest, which represents it.
 struct Sets(Vec<u32>);
 
 impl Sets {
@@ -38,31 +38,33 @@ impl Pieces {
     /// Of triangles by their corners; corners at one place are one.
     pub fn new(triangles: &[[DVec3; 3]]) -> Self {
         let mut sets = Sets((0..triangles.len() as u32).collect());
-        let edges = edges(triangles);
-        for sides in edges.values() {
-            if let &[(a, _), (b, _)] = &sides[..] {
-                sets.join(a, b);
+        let sides = sides(triangles);
+        let edges = || sides.chunk_by(|a, b| a.edge == b.edge);
+        for edge in edges() {
+            if let [a, b] = edge {
+                sets.join(a.triangle, b.triangle);
             }
         }
         // All of them are found before any is joined: what is joined must not hang on the order of the edges.
-        let mut is_open = |sides: &[(u32, i32)]| {
-            let mut balance: Vec<(u32, i32)> = sides.iter().map(|&(i, way)| (sets.find(i), way)).collect();
+        let mut is_open = |edge: &[Side]| {
+            let mut balance: Vec<(u32, i32)> = edge.iter().map(|side| (sets.find(side.triangle), side.way)).collect();
             balance.sort_unstable();
             balance.chunk_by(|a, b| a.0 == b.0).any(|set| set.iter().map(|side| side.1).sum::<i32>() != 0)
         };
-        let open: Vec<_> = edges.values().filter(|sides| sides.len() > 2 && is_open(sides)).collect();
-        for sides in open {
-            sides.iter().for_each(|&(i, _)| sets.join(sides[0].0, i));
+        let open: Vec<&[Side]> = edges().filter(|edge| edge.len() > 2 && is_open(edge)).collect();
+        for edge in open {
+            edge.iter().for_each(|side| sets.join(edge[0].triangle, side.triangle));
         }
         Self::of_sets(triangles, &mut sets)
     }
 
     fn of_sets(triangles: &[[DVec3; 3]], sets: &mut Sets) -> Self {
-        let mut number = HashMap::new();
         let (mut of, mut volumes, mut origins) = (Vec::with_capacity(triangles.len()), Vec::new(), Vec::new());
         for (i, corners) in (0..).zip(triangles) {
-            let piece = *number.entry(sets.find(i)).or_insert(volumes.len());
-            if piece == volumes.len() {
+            // The lowest of a set represents it, so the others come after it.
+            let representative = sets.find(i);
+            let piece = if representative == i { volumes.len() } else { of[representative as usize] as usize };
+            if representative == i {
                 volumes.push(0.0);
                 origins.push(corners[0]);
             }
@@ -92,21 +94,39 @@ impl Pieces {
     }
 }
 
-/// The triangles at each edge, with 1 for those that go along it from the lower corner to the higher one, -1 for the others.
-fn edges(triangles: &[[DVec3; 3]]) -> HashMap<(u32, u32), Vec<(u32, i32)>> {
-    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
-    let mut edges: HashMap<(u32, u32), Vec<(u32, i32)>> = HashMap::new();
-    for (i, corners) in (0..).zip(triangles) {
-        let [a, b, c] = corners.map(|p| {
-            let next = first_at.len() as u32;
-            // Zeros of both signs are one place.
-            *first_at.entry((p + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert(next)
-        });
+/// An edge of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    /// The places of its ends, the lower one first.
+    edge: (u32, u32),
+    triangle: u32,
+    /// 1 if the triangle goes along it from the lower place to the higher one, else -1.
+    way: i32,
+}
+
+/// All edges of the triangles, those at the same places together. A sorted list: a map with a list for each edge takes four times as
+/// long and three times the memory.
+fn sides(triangles: &[[DVec3; 3]]) -> Vec<Side> {
+    let places = places(triangles);
+    let mut sides = Vec::with_capacity(triangles.len() * 3);
+    for (triangle, [a, b, c]) in (0..).zip(places) {
         for (a, b) in [(a, b), (b, c), (c, a)].into_iter().filter(|(a, b)| a != b) {
-            edges.entry((a.min(b), a.max(b))).or_default().push((i, if a < b { 1 } else { -1 }));
+            sides.push(Side { edge: (a.min(b), a.max(b)), triangle, way: if a < b { 1 } else { -1 } });
         }
     }
-    edges
+    sides.sort_unstable();
+    sides
+}
+
+/// Numbers of the corners' places.
+fn places(triangles: &[[DVec3; 3]]) -> Vec<[u32; 3]> {
+    let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
+    let mut place = |p: DVec3| {
+        let next = first_at.len() as u32;
+        // Zeros of both signs are one place.
+        *first_at.entry((p + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert(next)
+    };
+    triangles.iter().map(|corners| corners.map(&mut place)).collect()
 }
 
 #[cfg(test)]
@@ -144,5 +164,25 @@ mod tests {
         assert_eq!(counted(&rooms), (1, vec![false]));
         let open: Vec<_> = rooms.iter().copied().filter(|t| !is_wall(t)).collect();
         assert_eq!((open.len(), counted(&open)), (20, (1, vec![false])));
+    }
+
+    /// Neither the order of triangles nor what they are numbered by decides what is a piece.
+    #[test]
+    fn pieces_are_the_same_in_any_order_of_triangles() {
+        let centres = [DVec3::ZERO, DVec3::splat(2.0), DVec3::new(4.0, 2.0, 2.0), DVec3::new(-9.0, 0.0, 0.0)];
+        let mut all: Vec<_> = centres.iter().zip([1.0, 1.0, 1.0, -2.0]).flat_map(|(c, h)| cuboid(*c, h)).collect();
+        let box_of: Vec<usize> = (0..all.len()).map(|i| [0, 1, 1, 3][i / 12]).collect();
+        let mut order: Vec<usize> = (0..all.len()).collect();
+        for _ in 0..4 {
+            let pieces = Pieces::new(&all);
+            for (i, j) in (0..all.len()).flat_map(|i| (0..i).map(move |j| (i, j))) {
+                let same = box_of[order[i]] == box_of[order[j]];
+                assert_eq!(pieces.of(i as u32) == pieces.of(j as u32), same, "{i} {j}");
+            }
+            (0..all.len()).for_each(|i| assert_eq!(pieces.is_void(pieces.of(i as u32)), box_of[order[i]] == 3));
+            // Every seventh of 48.
+            all = (0..all.len()).map(|i| all[i * 7 % 48]).collect();
+            order = (0..order.len()).map(|i| order[i * 7 % 48]).collect();
+        }
     }
 }
