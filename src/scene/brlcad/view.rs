@@ -16,8 +16,9 @@ use crate::scene::text::shown;
 /// How far from a rotation a matrix may be: scripts have ten digits, old ones six.
 const ROTATION_ERROR: f64 = 1e-3;
 
-/// Letters of `rt`'s options that take a value, in the same word or the next (its manual page; `-I` and `-v` take none).
-const WITH_VALUE: &str = "abcdefgjklmnopsuwxzACDEFGHJKNOPQTUVX,@+!";
+/// Letters of `rt`'s options that take a value, in the same word or the next (its manual page; `-I` and `-v` take none, and the haze is
+/// `-h` in older versions).
+const WITH_VALUE: &str = "abcdefghjklmnopqsuwxzACDEFGHJKNOPQTUVX.,@+!";
 
 /// Where to look from, the way BRL-CAD says it. Millimetres, model space.
 #[derive(Clone, Debug, PartialEq)]
@@ -114,7 +115,9 @@ fn shell_part(mut lines: Lines<'_>, draft: &mut Draft) -> Result<usize> {
         if text.starts_with('#') {
             continue;
         }
-        if text.contains("<<EOF") || text.contains("<< EOF") {
+        let commands = ["<<EOF", "<< EOF"].into_iter().find_map(|mark| text.find(mark));
+        if let Some(at) = commands {
+            words.extend(shell_words(&text[..at]));
             draft.take_words(&words);
             return Ok(lines.position());
         }
@@ -137,6 +140,11 @@ fn shell_words(line: &str) -> Vec<String> {
     words.filter(|word| !word.is_empty()).map(|word| word.replace(['\'', '"'], "")).collect()
 }
 
+/// Whether a word sends a stream elsewhere: `>log`, `2>>log`, `2>&1`, `&>log`, `3<file`.
+fn is_redirection(word: &str) -> bool {
+    word.trim_start_matches(|c: char| c.is_ascii_digit() || c == '&').starts_with(['>', '<'])
+}
+
 /// Where the commands end: at a line `EOF`, or at the end of the file.
 fn end_of_script(bytes: &[u8], start: usize) -> usize {
     let ends = bytes[start..].windows(4).position(|w| w == b"\nEOF");
@@ -157,11 +165,12 @@ impl Draft {
                     let angle = value.parse().ok().filter(|&p: &f64| p > 0.0 && p < 180.0);
                     self.perspective = angle.map(f64::to_radians);
                 }
-            } else if word.starts_with("2>") || word.starts_with(['>', '<', '$']) {
-                if word.ends_with('>') {
+            } else if is_redirection(word) {
+                // Its file is the next word if nothing is left of this one.
+                if word.ends_with(['>', '<']) {
                     words.next();
                 }
-            } else {
+            } else if !word.starts_with('$') {
                 if has_database {
                     self.tops.push(word.into());
                 }
@@ -297,10 +306,30 @@ mod tests {
             ("\\\n -otor.rt.pix -w 512 -n512 -V 1.5", None),
             ("-o tor.pix -p 35 -J 0 -A 0.9 -C255/0/0 -B -r", Some(35.0)),
             ("-BP 2 -Wp60 -c 'set ambSamples=8'", Some(60.0)),
+            ("-q 512 -h 0.1,0.8,0.9,0.99 -. 0.5 -p 35", Some(35.0)),
         ] {
             let view = saved(&format!("{options}{names}"));
             assert_eq!(view.tops, ["tor.r", "2light.r"], "{options}");
             assert_eq!(view.perspective, angle.map(f64::to_radians), "{options}");
+        }
+    }
+
+    /// MGED breaks the line before `<<EOF`; people do not.
+    #[test]
+    fn words_before_the_commands_on_their_line_count() {
+        for line in ["rt -M -p 60 moss.g all.g b <<EOF", "rt -M \\\n -p60 moss.g \\\n all.g 'b' 2>log << EOF"] {
+            let view = read(&format!("#!/bin/sh\n{line}\n{PLAIN}\nEOF\n")).unwrap();
+            assert_eq!(view.tops, ["all.g", "b"], "{line}");
+            assert_eq!(view.perspective, Some(60f64.to_radians()), "{line}");
+        }
+    }
+
+    #[test]
+    fn redirections_are_no_names() {
+        for to in ["1>log", "2>&1", ">log 2>&1", "> log", "1>> log", "&>log", "&> log", "3<f", "0< f", "2>> log", "$*"]
+        {
+            let view = read(&format!("#!/bin/sh\nrt -M {to} moss.g all.g {to} 2b <<EOF\n{PLAIN}\nEOF\n")).unwrap();
+            assert_eq!(view.tops, ["all.g", "2b"], "{to}");
         }
     }
 
