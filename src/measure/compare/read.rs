@@ -11,7 +11,8 @@ const MAX_BYTES: u64 = 64 << 20;
 /// Most runs in a folder.
 const MAX_TURNS: usize = 1000;
 
-/// What a row is about. Shape: scene hash, class, query, engine or peer with its mode, precision, threads, rays.
+/// What a row is about. Shape: scene hash (with the number of the scene among those of one hash, from the second on), class, query,
+/// engine or peer with its mode, precision, threads, rays.
 pub type Key = [String; 7];
 
 const KEY_COLUMNS: [&str; 8] = ["scene_hash", "class", "query", "engine", "peer_mode", "precision", "threads", "rays"];
@@ -101,6 +102,23 @@ impl Columns<'_> {
     }
 }
 
+/// Names of a run's scenes by hash: files of one content are scenes of one hash, each with its rows.
+#[derive(Default)]
+struct Scenes(HashMap<String, Vec<String>>);
+
+impl Scenes {
+    /// `hash`, with a number behind it if `name` is not the first scene that has it. Not with the name: a file that was renamed between
+    /// two runs is the same scene.
+    fn hash_of(&mut self, hash: &str, name: &str) -> String {
+        let names = self.0.entry(hash.into()).or_default();
+        let at = names.iter().position(|known| known == name).unwrap_or(names.len());
+        if at == names.len() {
+            names.push(name.into());
+        }
+        if at == 0 { hash.into() } else { format!("{hash} {}", at + 1) }
+    }
+}
+
 /// [`read`] of one file in memory; `path` is only for messages.
 pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Turn> {
     let mut reader = csv::Reader::from_reader(text);
@@ -122,6 +140,7 @@ pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Turn> {
     let [status, scene, repeat, mrays, mad, ratio] = places;
     let (date, seconds) = (columns.find("date"), columns.find("seconds"));
     let mut turn = Turn::default();
+    let mut scenes = Scenes::default();
     for record in reader.records() {
         let record = record.map_err(wrong)?;
         let line = record.position().map_or(1, csv::Position::line);
@@ -129,6 +148,8 @@ pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Turn> {
         if turn.date.is_empty() {
             turn.date = date.map_or("", cell).into();
         }
+        // Scenes without a timed row count, too: the numbers of the others must not hang on what was timed.
+        let numbered = scenes.hash_of(cell(keys[0]), cell(scene));
         if cell(status) != "ok" {
             continue;
         }
@@ -151,9 +172,9 @@ pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Turn> {
             rates: passes.iter().map(rate).collect(),
             ratios: Vec::new(),
         };
-        let [hash, class, query, engine, mode, precision, threads, rays] = keys.map(|i| cell(i).to_string());
+        let [_, class, query, engine, mode, precision, threads, rays] = keys.map(|i| cell(i).to_string());
         let engine = if mode.is_empty() { engine } else { format!("{engine} [{mode}]") };
-        if turn.figures.insert([hash, class, query, engine, precision, threads, rays], figure).is_some() {
+        if turn.figures.insert([numbered, class, query, engine, precision, threads, rays], figure).is_some() {
             return Err(Error::at_line(path, line, 1, "a second row about the same rays and engine"));
         }
     }

@@ -67,6 +67,23 @@ fn turns_without_passes_compare() {
     assert_eq!((change.verdict, change.factor, change.basis), ("faster", Some(2.0), Some("rates")));
 }
 
+/// `bench a/m.obj b/m.obj` of two equal files: rows of `m` and `m-2` with one hash.
+#[test]
+fn scenes_of_one_hash_have_each_their_rows() {
+    let rows = |names: [&str; 2], mrays: [f64; 2]| {
+        let named = |name, mrays| row("tile", mrays, 0.0, "").replace(",box,", &format!(",{name},"));
+        [parsed(&(named(names[0], mrays[0]) + &named(names[1], mrays[1]))).unwrap()]
+    };
+    let old = rows(["m", "m-2"], [10.0, 30.0]);
+    // The hash says what is the same, also of a file by another name.
+    for names in [["m", "m-2"], ["n", "n-2"]] {
+        let factors: Vec<_> = compare(&old, &rows(names, [20.0, 30.0])).iter().map(|c| c.factor.unwrap()).collect();
+        assert_eq!(factors, [2.0, 1.0], "{names:?}");
+    }
+    let scenes: Vec<_> = compare(&old, &old).into_iter().map(|change| change.scene).collect();
+    assert_eq!(scenes, ["m", "m-2"]);
+}
+
 #[test]
 fn runs_without_a_common_row_are_refused() {
     let [old, new] = ["tile", "packet4"].map(|engine| [parsed(&row(engine, 1.0, 0.0, "1")).unwrap()]);
