@@ -107,7 +107,9 @@ pub fn unpack(file: &Path, bytes: Vec<u8>, limit: UnpackLimit) -> Result<Vec<u8>
     read.map_err(|e| Error::whole(file, format!("{} data is damaged after {} bytes: {e}", packing.name(), out.len())))?;
     if out.len() as u64 > most {
         let what = format!("unpacks to more than {most} bytes, the limit for {} compressed bytes", bytes.len());
-        return Err(Error::whole(file, what).with_help("unpack the file first"));
+        let error = Error::whole(file, what);
+        // What is over the cap is refused unpacked, too.
+        return Err(if most < limit.cap { error.with_help("unpack the file first") } else { error });
     }
     Ok(out)
 }
@@ -190,6 +192,9 @@ mod tests {
         for packed in [gzip(&zeros[1..]), zst(&zeros[1..])] {
             assert_eq!(unpack(Path::new("m.ply"), packed, SMALL).unwrap().len(), 1_000);
         }
+        let capped = UnpackLimit { cap: 1_000, ..SMALL };
+        let said = |limit| unpack(Path::new("m.ply"), gzip(&zeros), limit).unwrap_err().to_string();
+        assert_eq!([SMALL, capped].map(|limit| said(limit).contains("help: unpack the file first")), [true, false]);
         assert_eq!([0, 400, 50_000].map(|n| SMALL.unpacked(n)), [1_000, 1_200, 100_000]);
         assert_eq!(DEFAULT_LIMIT.unpacked(u64::MAX), 16 << 30);
     }
