@@ -169,6 +169,20 @@ fn refusals_say_what_is_expected() {
     assert_eq!(files(dir.path()), ["script.txt", "square.ply"]);
 }
 
+/// What `--integrator rt` refuses to begin with is refused later, too, and let through by `--lenient`.
+#[test]
+fn shaders_that_rt_does_not_know_are_refused_whenever_it_is_chosen() {
+    let dir = folder("integrator rt\nframe 0\n");
+    let database = "title {t}\nunits mm\nput {a.s} sph V {0 0 0} A {10 0 0} B {0 10 0} C {0 0 10}\n\
+        put {a.r} comb region yes shader {wood} tree {l a.s}\n";
+    std::fs::write(dir.path().join("wood.asc"), database).unwrap();
+    let line = "view wood.asc --size 8x8 --headless-script script.txt";
+    let arguments: Vec<&str> = line.split(' ').collect();
+    refused(dir.path(), &arguments, "script.txt:1:1: the shader `wood` of region /a.r is not supported; --lenient");
+    let ended = lanecast(dir.path(), &[&arguments[..], &["--lenient"]].concat());
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+}
+
 const SCENE: &str = "camera \"c\" { eye 0 0 6; look-at 0 0 0; up 0 1 0; fov 40 }\n\
     difference { box { size 2 2 2 }; sphere radius=RADIUS }\n";
 

@@ -165,7 +165,7 @@ fn view(args: &ViewArgs, stage: &dyn Stage) -> Result<View> {
     let options = RenderOptions { width, height, spp, integrator, depth, engine, ..Default::default() };
     options.check()?;
     let look = Look { camera, rt, options, start: LARGEST_BLOCK, heat: None };
-    Ok(View { look, home, exposure: args.exposure })
+    Ok(View { look, home, exposure: args.exposure, lenient: args.scene.options.lenient })
 }
 
 fn save(args: &ViewArgs, path: &Path, film: &Film, view: &View) -> Result<()> {

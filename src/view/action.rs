@@ -7,7 +7,7 @@ use crate::camera::framing;
 use crate::error::{Error, Result, nearest_name};
 use crate::render::RenderOptions;
 use crate::scene::description::{CameraDescription, Projection};
-use crate::shade::Integrator;
+use crate::shade::{Integrator, unknown_shaders};
 use crate::trace::EXACT_ENGINE;
 
 /// A change of what is looked at, or how.
@@ -62,6 +62,8 @@ pub struct View {
     pub home: CameraDescription,
     /// Colours are shown times 2^exposure.
     pub exposure: f32,
+    /// Whether the integrator `rt` may show shaders that it does not know as plastic.
+    pub lenient: bool,
 }
 
 impl View {
@@ -97,9 +99,10 @@ impl View {
                 }
             }
             Action::Reset => *camera = self.home.clone(),
-            Action::Integrator(name) => show(options, known_integrator(stage, name)?),
+            Action::Integrator(name) => show(options, known_integrator(stage, name, self.lenient)?),
             Action::NextIntegrator => {
-                let all: Vec<Integrator> = Integrator::ALL.into_iter().filter(|&i| can_show(stage, i)).collect();
+                let can_show = |&i: &Integrator| obstacle(stage, i, self.lenient).is_none();
+                let all: Vec<Integrator> = Integrator::ALL.into_iter().filter(can_show).collect();
                 show(options, after(&all, options.integrator));
             }
             Action::Engine(name) => options.engine = known_engine(stage, name)?,
@@ -142,17 +145,21 @@ fn show(options: &mut RenderOptions, integrator: Integrator) {
     (options.integrator, options.depth) = (integrator, integrator.depth());
 }
 
-fn known_integrator(stage: &dyn Stage, name: &str) -> Result<Integrator> {
+fn known_integrator(stage: &dyn Stage, name: &str, lenient: bool) -> Result<Integrator> {
     let integrator = name.parse()?;
-    if can_show(stage, integrator) {
-        return Ok(integrator);
-    }
-    Err(Error::Usage(format!("the integrator `{name}` shows BRL-CAD databases only")))
+    obstacle(stage, integrator, lenient).map_or(Ok(integrator), |what| Err(Error::Usage(what)))
 }
 
-/// Whether the scene has what `integrator` needs.
-fn can_show(stage: &dyn Stage, integrator: Integrator) -> bool {
-    integrator != Integrator::Rt || stage.description().looks.is_some()
+/// Why `integrator` cannot show the scene, if so: what a view may not begin with, it may not be changed to.
+fn obstacle(stage: &dyn Stage, integrator: Integrator, lenient: bool) -> Option<String> {
+    if integrator != Integrator::Rt {
+        return None;
+    }
+    let Some(looks) = &stage.description().looks else {
+        return Some(format!("the integrator `{}` shows BRL-CAD databases only", integrator.name()));
+    };
+    let (shader, region) = unknown_shaders(looks).into_iter().next().filter(|_| !lenient)?;
+    Some(format!("the shader `{shader}` of region {region} is not supported; --lenient shows it as plastic"))
 }
 
 fn known_engine(stage: &dyn Stage, name: &str) -> Result<String> {
