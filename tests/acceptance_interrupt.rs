@@ -111,3 +111,29 @@ fn a_killed_render_goes_on() {
     let [out, whole] = ["out.exr", "whole.exr"].map(|name| exr::read(&dir.path().join(name)).expect("a file"));
     assert_eq!(out.planes, whole.planes);
 }
+
+/// Where time or noise decides, all tiles have samples soon: a stopped picture is written and said to be cut short, a stopped frame is
+/// not written.
+#[test]
+fn pictures_without_a_number_of_samples_can_be_stopped_too() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let scene = "light point { position 3 6 6; intensity 120 }\nsphere { translate \"frame * 0.1\" 0 0 }\n";
+    std::fs::write(dir.path().join("turn.kdl"), scene).expect("a scene");
+    let common = "render turn.kdl --size 128x128 --integrator path --json";
+    for (more, wanted) in [
+        ("-o a.exr --noise 1e-9", &["a.exr"][..]),
+        ("-o b.exr --time-limit 600", &["b.exr"][..]),
+        ("-o c.exr --time-limit 600 --frames 1..2", &[][..]),
+    ] {
+        let line = format!("{common} {more}");
+        let running = Running::start(dir.path(), &line.split(' ').collect::<Vec<_>>());
+        std::thread::sleep(Duration::from_millis(1500));
+        interrupt(&running);
+        let Ended { code, out, err } = running.wait(LIMIT).ended;
+        assert_eq!(code, Some(130), "{line}: {err}");
+        assert!(out.contains("\"complete\":false"), "{line}: {out}");
+        let left: Vec<_> = files(dir.path()).into_iter().filter(|name| name != "turn.kdl").collect();
+        assert_eq!(left, wanted, "{line}: {err}");
+        wanted.iter().for_each(|name| std::fs::remove_file(dir.path().join(name)).expect("a file"));
+    }
+}

@@ -37,16 +37,19 @@ pub struct RenderOutput {
     pub counters: Counters,
     /// Where the time went, level by level, all threads together.
     pub paths: PathStats,
-    /// Tiles finished.
+    /// Tiles finished; with a time limit or a noise level those that have samples.
     pub tiles_done: u64,
     /// Tiles of the window.
     pub tiles_total: u64,
+    /// Whether it was stopped while tiles that have samples wanted more; only with a time limit or a noise level (else such tiles
+    /// are not done). That the time limit is over is no stop.
+    pub is_cut_short: bool,
 }
 
 impl RenderOutput {
     /// Whether all tiles are finished (not stopped before).
     pub fn is_complete(&self) -> bool {
-        self.tiles_done == self.tiles_total
+        self.tiles_done == self.tiles_total && !self.is_cut_short
     }
 }
 
@@ -135,7 +138,7 @@ pub fn render_kept<S: Shades>(
         progress.tile_done(total);
         names
     };
-    let tally = if options.is_adaptive() {
+    let (tally, is_cut_short) = if options.is_adaptive() {
         job.rounds(&tiles, paint)
     } else {
         let one_tile = |(memory, tile): &mut (Memory<S>, Tile), &number: &u32| {
@@ -152,9 +155,9 @@ pub fn render_kept<S: Shades>(
             tally
         };
         let memory = || (Memory::default(), job.tile());
-        tiles.par_iter().map_init(memory, one_tile).reduce(Tally::default, Tally::plus)
-    }
-    .plus(before);
+        (tiles.par_iter().map_init(memory, one_tile).reduce(Tally::default, Tally::plus), false)
+    };
+    let tally = tally.plus(before);
     let mut film = film.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
     if let Some(mattes) = job.mattes {
         mattes.finish(&mut film);
@@ -167,6 +170,7 @@ pub fn render_kept<S: Shades>(
         paths: tally.paths,
         tiles_done: tally.done,
         tiles_total: total,
+        is_cut_short,
     })
 }
 
@@ -245,8 +249,8 @@ impl<S: Shades> Job<'_, S> {
     }
 
     /// Rounds over all tiles, each doubling the samples, until all have the wanted samples or little noise, or the
-    /// time is over. Then calls `paint` for each tile that has samples.
-    fn rounds(&self, tiles: &[u32], paint: impl Fn(&Tile, &mut Memory<S>) -> Names + Sync) -> Tally {
+    /// time is over. Then calls `paint` for each tile that has samples. Also says whether it was stopped before.
+    fn rounds(&self, tiles: &[u32], paint: impl Fn(&Tile, &mut Memory<S>) -> Names + Sync) -> (Tally, bool) {
         let options = self.canvas.options;
         let (spp, limit) = (options.spp, options.time_limit.unwrap_or(f64::INFINITY));
         let in_time = || self.start.elapsed().as_secs_f64() < limit;
@@ -255,7 +259,7 @@ impl<S: Shades> Job<'_, S> {
         let mut states: Vec<State> = tiles.iter().map(state).collect();
         let mut total = Tally::default();
         let mut target = FIRST_ROUND.min(spp);
-        loop {
+        let is_cut_short = loop {
             let one_tile = |memory: &mut Memory<S>, state: &mut State| {
                 if state.is_done {
                     return Tally::default();
@@ -285,11 +289,14 @@ impl<S: Shades> Job<'_, S> {
             if let Some(noise) = options.noise {
                 self.judge(&mut states, noise);
             }
-            if target >= spp || !in_time() || self.progress.stopped() || states.iter().all(|state| state.is_done) {
-                break;
+            // Where the time is over, no tile wants more; a stop in the last round leaves some that do.
+            let wants_more = in_time() && states.iter().any(|state| !state.is_done && state.tile.count < spp);
+            let is_stopped = self.progress.stopped();
+            if target >= spp || !wants_more || is_stopped {
+                break wants_more && is_stopped;
             }
             target = target.saturating_mul(2).min(spp);
-        }
+        };
         let finished = |memory: &mut Memory<S>, State { tile, .. }: &mut State| {
             if tile.count == 0 {
                 return Tally::default();
@@ -298,7 +305,7 @@ impl<S: Shades> Job<'_, S> {
             Tally { done: 1, ..Tally::default() }
         };
         let painted = states.par_iter_mut().map_init(Memory::default, finished);
-        total.plus(painted.reduce(Tally::default, Tally::plus))
+        (total.plus(painted.reduce(Tally::default, Tally::plus)), is_cut_short)
     }
 
     /// Says which tiles are done, for now: what a tile finds may open the tiles around it again.

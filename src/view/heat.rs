@@ -107,6 +107,7 @@ pub(super) fn render<S: Shades>(
         paths: Default::default(),
         tiles_done: done.tiles,
         tiles_total: tiles.len() as u64,
+        is_cut_short: false,
     })
 }
 

@@ -208,3 +208,36 @@ fn a_stopped_render_keeps_the_finished_tiles_and_says_so() {
     assert!((0..67 * 45).all(|i| part[0].1[i] == whole[0].1[i] || part[0].1[i] == 0));
     assert!((67 * 45 - 4 * 256..67 * 45).contains(&untouched));
 }
+
+/// Stops when it was asked this many times.
+struct StopAt(AtomicU64);
+
+impl Progress for StopAt {
+    fn tile_done(&self, _: u64) {}
+    fn stopped(&self) -> bool {
+        self.0.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1)).is_err()
+    }
+}
+
+/// Where rounds go over all tiles, each has some samples when the picture is stopped: that does not make it whole. A time limit that is
+/// over does.
+#[test]
+fn a_render_stopped_between_rounds_is_not_complete() {
+    let d = scene();
+    let world = World::<f32>::compile(&d, Preset::Balanced).unwrap();
+    let camera = Camera::new(&framing(world.bounds(), 1.5), 1.5).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let made = |noise, time_limit, asked| {
+        let options = RenderOptions { tile: 16, spp: 1 << 16, noise, time_limit, aovs: Vec::new(), ..options() };
+        let stop = StopAt(AtomicU64::new(asked));
+        let output = pool.install(|| render(&world, &d, &camera, &options, &stop).unwrap());
+        (output.tiles_done, output.is_complete())
+    };
+    // Rounds of 4, 8 and 16 samples in 15 tiles: the third ends early.
+    assert_eq!(made(Some(1e-9), None, 200), (15, false));
+    assert_eq!(made(None, Some(1e6), 200), (15, false));
+    assert!(!made(None, Some(1e6), 20).1);
+    assert_eq!(made(None, Some(1e-9), 200), (15, true));
+    // Enough before the stop is asked for.
+    assert_eq!(made(Some(1e9), None, 1000), (15, true));
+}

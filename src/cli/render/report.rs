@@ -130,6 +130,7 @@ pub(super) fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput
     let part = match (report.complete, done) {
         (true, _) => String::new(),
         (false, 0) => format!(", none of {total} tiles was finished, nothing is written"),
+        (false, _) if done == total => ", stopped before the samples sufficed".into(),
         (false, _) => format!(", only {done} of {total} tiles"),
     };
     args.output.say(&format!(

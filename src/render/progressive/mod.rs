@@ -204,6 +204,7 @@ impl<'a, S: Shades> Progressive<'a, S> {
             paths: self.tally.paths,
             tiles_done: self.tally.done,
             tiles_total: self.total,
+            is_cut_short: false,
         }
     }
 
