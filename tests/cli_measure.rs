@@ -440,6 +440,25 @@ fn explain_counts_compares_and_draws() {
     binary::refused(dir.path(), &["explain", "square.ply", "--engine", "paket8"], "packet8");
 }
 
+/// All rays of a picture are held at once: more than fit are refused, not tried.
+#[test]
+fn pictures_beyond_all_memory_are_refused() {
+    let dir = square();
+    let film = "more than 268435456 pixels in one film";
+    for (line, what) in [
+        ("rays square.ply --kind primary --size 65536x65536 -o r.npy", film),
+        ("rays square.ply --kind scatter --size 16384x16385 -o r.npy", film),
+        ("bench square.ply --size 65536x65536 --engines scalar --threads 1", film),
+        ("explain square.ply --size 65536x65536 --engine scalar", film),
+        ("verify square.ply --size 65536x65536", "verify takes at most 10000000"),
+        ("verify square.ply --size 3200x3200", "3200x3200 rays per class"),
+        ("verify square.ply --rays 10000001", "10000000"),
+    ] {
+        binary::refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);
+    }
+    assert_eq!(files(dir.path()), ["square.ply"]);
+}
+
 /// Two scenes' worth of steps; a killed experiment goes on without measuring anything twice.
 #[test]
 fn experiments_resume_where_they_were() {

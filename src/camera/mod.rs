@@ -19,4 +19,4 @@ pub use lines::{Range, range_of_tile};
 pub use model::{Camera, CameraOverrides};
 pub use passes::{Passes, Run};
 pub use scattered::fill_pixels;
-pub use tiles::{FILE_TILE, PixelRect, Tiling, morton_decode, morton_encode};
+pub use tiles::{FILE_TILE, MAX_PIXELS, PixelRect, Tiling, morton_decode, morton_encode};

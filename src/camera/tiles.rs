@@ -12,6 +12,9 @@ pub const FILE_TILE: u32 = 32;
 /// Largest picture edge, pixels.
 const MAX_EDGE: u32 = 1 << 16;
 
+/// Most pixels that are held at once: a film of 12 planes then takes 12 GiB, the primary rays of a view and their hits some more.
+pub const MAX_PIXELS: u64 = 1 << 28;
+
 /// A rectangle of pixels, half open: x0 <= x < x1, y0 <= y < y1; y down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelRect {

@@ -8,7 +8,7 @@ use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
 use crate::measure::raysets::RayKind;
 use crate::measure::timing::Workers;
-use crate::measure::verify::{Line, Options, verify};
+use crate::measure::verify::{Line, MAX_RAYS, Options, verify};
 use crate::scene::description::Description;
 use crate::trace::Engines;
 
@@ -31,7 +31,7 @@ pub struct VerifyArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Rays per class, about, if there is no --size [default: as many as take seconds]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MAX_RAYS))]
     rays: Option<u64>,
     /// Ray classes
     #[arg(

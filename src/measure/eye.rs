@@ -3,8 +3,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::camera::{Camera, FILE_TILE, PixelRect, SubPixel, Tiling, aim_tile, fill_tile};
-use crate::error::Result;
+use crate::camera::{Camera, FILE_TILE, MAX_PIXELS, PixelRect, SubPixel, Tiling, aim_tile, fill_tile};
+use crate::error::{Error, Result};
 use crate::lanes::Real;
 use crate::measure::raysets::{RayKind, Setting, Starts, light_for, scatter};
 use crate::measure::timing::Made;
@@ -56,7 +56,7 @@ impl View {
     /// primary rays are traced by the `scalar` engine on the current rayon pool.
     ///
     /// # Errors
-    /// Those of `camera`; sizes that no picture has.
+    /// Those of `camera`; sizes that no picture has, and more than [`MAX_PIXELS`] pixels: all their rays are held at once.
     pub fn new<S: Engines>(
         world: &World<S>,
         description: &Description,
@@ -64,9 +64,13 @@ impl View {
         size: (u32, u32),
         seed: u64,
     ) -> Result<Self> {
+        let tiling = Tiling::new(size.0, size.1, FILE_TILE)?;
+        let pixels = u64::from(size.0) * u64::from(size.1);
+        if pixels > MAX_PIXELS {
+            return Err(Error::Usage(format!("more than {MAX_PIXELS} pixels in one film")));
+        }
         let bounds = world.bounds();
         let Eye { camera, up } = camera(bounds, size)?;
-        let tiling = Tiling::new(size.0, size.1, FILE_TILE)?;
         let primary = primary_rays(&camera, &tiling);
         let scalar = engine::<S>("scalar")?;
         let starts = Starts::trace(world, scalar, &primary);
@@ -75,7 +79,6 @@ impl View {
         let up = up.normalize_or_zero();
         let clearance = clearance(world, scalar, camera.eye, up);
         let light = light_for(&description.lights, camera.eye, up, diagonal, clearance);
-        let pixels = u64::from(size.0) * u64::from(size.1);
         let setting = Setting { light, diagonal, seed };
         Ok(Self { primary, starts, setting, pixels, camera, tiling })
     }

@@ -17,6 +17,9 @@ use crate::trace::{Engine, Engines, engine};
 /// second).
 pub const BRUTE_LIMIT: u64 = 400_000_000;
 
+/// Most rays per class, about (2 GB): all engines' answers to them are held at once.
+pub const MAX_RAYS: u64 = 10_000_000;
+
 /// What to verify.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -82,7 +85,7 @@ pub fn picture_of(rays: u64) -> (u32, u32) {
 /// Verifies all engines of precision `S` on `description` seen by `camera`; each finished line goes to `report`.
 ///
 /// # Errors
-/// Those of compiling the world and making the rays; [`Error::Interrupted`] when `stop` says so.
+/// A picture of more than [`MAX_RAYS`] pixels; those of compiling the world and making the rays; [`Error::Interrupted`] when `stop` says so.
 pub fn verify<S: Engines>(
     workers: &Workers,
     description: &Description,
@@ -91,6 +94,9 @@ pub fn verify<S: Engines>(
     stop: &dyn Fn() -> bool,
     report: &mut dyn FnMut(Line),
 ) -> Result<()> {
+    if let Some((width, height)) = options.size.filter(|&(w, h)| u64::from(w) * u64::from(h) > MAX_RAYS) {
+        return Err(Error::Usage(format!("{width}x{height} rays per class: verify takes at most {MAX_RAYS}")));
+    }
     let world = workers.install(|| World::<S>::compile(description, options.build))?;
     let rays = options.rays.unwrap_or_else(|| default_rays(world.assembly.instanced_prims()));
     let size = options.size.unwrap_or_else(|| picture_of(rays));

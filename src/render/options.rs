@@ -2,13 +2,11 @@
 
 use super::aov::Aov;
 use super::mattes;
-use crate::camera::{Filter, PixelRect, SubPixel, Tiling};
+use crate::camera::{Filter, MAX_PIXELS, PixelRect, SubPixel, Tiling};
 use crate::error::{Error, Result};
 use crate::film::Window;
 use crate::shade::{Integrator, Settings};
 
-/// Most pixels of a film (a film of 12 planes then takes 12 GiB).
-const MAX_PIXELS: u64 = 1 << 28;
 /// Most pixels whose sums are all kept in memory (2 GiB).
 const MAX_ADAPTIVE: u64 = 1 << 23;
 /// Most samples per pixel and occlusion rays per hit; more is a slip of the keyboard.
