@@ -102,6 +102,35 @@ fn outputs_that_cannot_be_written_are_told_before_the_work() {
     assert_eq!(binary::files(dir.path()), ["file"]);
 }
 
+/// What was read is not replaced by what was made of it, also where a link leads to it.
+#[test]
+fn inputs_are_not_written_over() {
+    let dir = folder();
+    for name in ["a.npy", "a.png", "b.png", "s.ply", "bench.csv"] {
+        std::fs::write(dir.path().join(name), name).expect("a file");
+    }
+    let mut lines = vec![
+        ("trace s.ply --rays a.npy --hits a.npy", "a.npy: expected another file to write to; this one is read"),
+        ("trace s.ply --rays a.npy --hits s.ply", "--hits s.ply: expected a name that ends in .npy"),
+        ("rays s.ply --kind ao -o s.ply", "-o s.ply: expected a name that ends in .npy"),
+        ("report . -o bench.csv", "-o bench.csv: expected a name that ends in .html"),
+        ("compare a.png b.png -o ./a.png", "./a.png: expected another file"),
+        ("compare a.png b.png -o c.png -o b.png", "b.png: expected another file"),
+        ("convert s.ply -o s.ply", "s.ply: expected another file"),
+    ];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("a.npy", dir.path().join("link.npy")).expect("a link");
+        lines.push(("trace s.ply --rays a.npy --hits link.npy", "this one is read (a.npy)"));
+    }
+    for (line, what) in lines {
+        refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);
+    }
+    for name in ["a.npy", "a.png", "b.png", "s.ply", "bench.csv"] {
+        assert_eq!(std::fs::read(dir.path().join(name)).expect("a file"), name.as_bytes());
+    }
+}
+
 /// Whatever says what is measured has no meaning where nothing is, or where a file says it.
 #[test]
 fn options_without_effect_are_refused() {

@@ -1,5 +1,7 @@
 //! Arguments that several commands share, and what they mean.
 
+use std::path::Path;
+
 use crate::error::{Error, Result};
 use crate::measure::timing::MAX_THREADS;
 use crate::scene::brlcad::describe::Options;
@@ -193,6 +195,18 @@ fn setting(text: &str) -> std::result::Result<(String, String), String> {
 /// Parses a finite number.
 pub fn finite(text: &str) -> std::result::Result<f32, String> {
     text.parse().ok().filter(|x: &f32| x.is_finite()).ok_or_else(|| "expected a number".into())
+}
+
+/// Checks that `file`, what `option` writes, is named as what it will hold: a name that ends otherwise is a mistake, and the file of
+/// that name perhaps an input.
+///
+/// # Errors
+/// [`Error::Usage`] if its name does not end in `.ENDING`.
+pub fn check_ending(option: &str, file: &Path, ending: &str) -> Result<()> {
+    if file.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("{option} {}: expected a name that ends in .{ending}", file.display())))
 }
 
 /// Threads to use.

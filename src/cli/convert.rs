@@ -10,7 +10,7 @@ use super::output::{json_to_stdout, to_stdout};
 use crate::convert::{Distances, Fineness, Grid, Solids, Topology, Voxels, Watch, surface, voxels};
 use crate::error::{Error, Result};
 use crate::film::mesh::{MeshKind, write_mesh};
-use crate::film::{check_file, npy};
+use crate::film::{check_apart, check_file, npy};
 use crate::scene::mesh::Mesh;
 
 /// Tolerance unless `--tolerance` says otherwise: this part of the box's diagonal.
@@ -119,6 +119,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
         return Err(Error::Usage("--cells is for meshes; voxels want --voxels or --tolerance".into()));
     }
     check_file(&args.file)?;
+    check_apart(&args.file, &[Path::new(&args.scene.scene)])?;
     let description = args.scene.load(&args.output)?;
     with_pool(args.threads.count(), || {
         let solids = Solids::new(&description, &args.solid)?;

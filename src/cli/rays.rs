@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::common::{CameraArgs, OutputArgs, SceneArgs, ThreadArgs, with_pool};
+use super::common::{CameraArgs, OutputArgs, SceneArgs, ThreadArgs, check_ending, with_pool};
 use super::interrupt::stopped;
 use super::output::json_to_stdout;
 use crate::error::{Error, Result};
@@ -68,6 +68,7 @@ struct Report<'a> {
 /// # Errors
 /// Bad input, an output that cannot be written, [`Error::Interrupted`].
 pub fn run(args: &RaysArgs) -> Result<()> {
+    check_ending("-o", &args.file, "npy")?;
     check_file(&args.file)?;
     let description = args.scene.seen_by(&args.camera)?.load(&args.output)?;
     let size = args.camera.size.unwrap_or(DEFAULT_SIZE);

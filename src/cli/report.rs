@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::common::{OutputArgs, ThreadArgs, with_pool};
+use super::common::{OutputArgs, ThreadArgs, check_ending, with_pool};
 use super::output::json_to_stdout;
 use crate::error::{Error, Result};
 use crate::film::{check_file, write_atomically};
@@ -58,6 +58,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     if let Some(file) = &args.readme {
         return readme(args, file);
     }
+    check_ending("-o", &args.file, "html")?;
     check_file(&args.file)?;
     let options = report::Options { title: args.title.clone(), command: env::command_line(), date: env::now() };
     let (page, summary) = with_pool(args.threads.count(), || report::html(&args.folder, &options))?;

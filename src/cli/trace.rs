@@ -7,11 +7,11 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::common::{EngineArgs, OutputArgs, SceneArgs, ThreadArgs};
+use super::common::{EngineArgs, OutputArgs, SceneArgs, ThreadArgs, check_ending};
 use super::interrupt::stopped;
 use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
-use crate::film::{check_file, npy};
+use crate::film::{check_apart, check_file, npy};
 use crate::lanes::compiled_isa;
 use crate::measure::answers::Answers;
 use crate::measure::raysets::{Query, split};
@@ -159,7 +159,11 @@ struct Bytes {
 /// # Errors
 /// Bad input; [`Error::Mismatch`] if the engine's hits are not the `scalar` engine's; [`Error::Interrupted`].
 pub fn run(args: &TraceArgs) -> Result<()> {
-    args.hits.iter().try_for_each(|file| check_file(file))?;
+    if let Some(file) = &args.hits {
+        check_ending("--hits", file, "npy")?;
+        check_file(file)?;
+        check_apart(file, &[&args.rays])?;
+    }
     let description = args.scene.load(&args.output)?;
     let rays = npy::read_rays(&args.rays)?;
     match (args.query, args.scene.options.precision(&description)) {

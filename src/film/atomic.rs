@@ -35,6 +35,21 @@ pub fn check_file(path: &Path) -> Result<()> {
     check().map_err(|e| Error::io(path, e))
 }
 
+/// Checks that writing `path` replaces none of `inputs`, the files that a command reads, whatever links lead to them: what was
+/// read is not to be lost.
+///
+/// # Errors
+/// A usage error that names both.
+pub fn check_apart(path: &Path, inputs: &[&Path]) -> Result<()> {
+    // What has no real name yet is nobody's input.
+    let Ok(target) = std::fs::canonicalize(path) else { return Ok(()) };
+    let is_target = |input: &&&Path| std::fs::canonicalize(input).is_ok_and(|input| input == target);
+    inputs.iter().find(is_target).map_or(Ok(()), |input| {
+        let (path, input) = (path.display(), input.display());
+        Err(Error::Usage(format!("{path}: expected another file to write to; this one is read ({input})")))
+    })
+}
+
 /// Checks that files can be written to the folder `path`, which is there or can be made; none is made.
 ///
 /// # Errors
@@ -177,6 +192,23 @@ mod tests {
         assert!(check_folder(Path::new("surely/not/there")).is_ok());
         assert_eq!(names_in(dir.path()), ["file", "new"]);
         assert_eq!(fs::read(&file).unwrap(), b"old");
+    }
+
+    #[test]
+    fn what_is_read_is_not_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let [a, b, new] = ["a", "b", "new"].map(|name| dir.path().join(name));
+        fs::write(&a, b"a").unwrap();
+        fs::write(&b, b"b").unwrap();
+        let other_name = dir.path().join(".").join("b");
+        assert!(check_apart(&a, &[&b, &new]).is_ok() && check_apart(&new, &[&new, &a]).is_ok());
+        assert!(check_apart(&b, &[&a, &other_name]).is_err());
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(&a, &new).unwrap();
+            let text = check_apart(&new, &[&b, &a]).unwrap_err().to_string();
+            assert!(text.contains("this one is read"), "{text}");
+        }
     }
 
     #[cfg(unix)]
