@@ -143,6 +143,11 @@ fn what_does_not_compare_is_refused() {
     refused(at, &["compare", "half.png", "half.png", "--map", "hdr-flip", "-o", "a.png"], "linear light");
     refused(at, &["compare", "half.png", "half.png", "--max-hdr-flip", "1"], "HDR-FLIP");
     refused(at, &["compare", "half.exr", "half.exr", "-o", "a.jpg"], "a.jpg");
+    for limit in
+        ["max-rmse=nan", "max-relmse=inf", "min-psnr=nan", "min-ssim=-inf", "max-flip=NaN", "max-hdr-flip=1e999"]
+    {
+        refused(at, &["compare", "half.exr", "half.exr", &format!("--{limit}")], "expected a number");
+    }
     let mut film = Film::full(3, 3).expect("a size");
     film.push("Y", PlaneData::F32(vec![0.0; 9])).expect("a plane");
     npy::write_plane(&at.join("small.npy"), 3, 3, &film.planes[0].data).expect("written");

@@ -84,22 +84,22 @@ pub struct CompareArgs {
 #[command(next_help_heading = "Limits (exit code 1 beyond them)")]
 struct Limits {
     /// Largest root mean squared error
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = limit)]
     max_rmse: Option<f64>,
     /// Largest mean relative squared error
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = limit)]
     max_relmse: Option<f64>,
     /// Smallest PSNR, decibels
-    #[arg(long, value_name = "DB")]
+    #[arg(long, value_name = "DB", value_parser = limit)]
     min_psnr: Option<f64>,
     /// Smallest SSIM
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = limit)]
     min_ssim: Option<f64>,
     /// Largest mean LDR-FLIP
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = limit)]
     max_flip: Option<f64>,
     /// Largest mean HDR-FLIP
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = limit)]
     max_hdr_flip: Option<f64>,
     /// Largest distance in units in the last place
     #[arg(long, value_name = "N")]
@@ -346,6 +346,11 @@ impl Check {
             None => Ok(self.failures),
         }
     }
+}
+
+/// A limit: what is no number would be passed by every figure, and an infinite one by none.
+fn limit(text: &str) -> std::result::Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "expected a number".into())
 }
 
 fn positive(text: &str) -> std::result::Result<f32, String> {
