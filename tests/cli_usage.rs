@@ -52,6 +52,7 @@ fn bad_usage_exits_with_2() {
     refused(path, &["rays", "builtin:cornell", "--kind", "primry", "-o", "r.npy"], "primary");
     refused(path, &["rays", "builtin:cornell", "--kind", "ao", "--size", "0x4", "-o", "r.npy"], "WIDTHxHEIGHT");
     refused(path, &["rays", "builtin:cornell", "--kind", "ao", "--fov", "180", "-o", "r.npy"], "degrees");
+    refused(path, &["render", "builtin:cornell", "--up", "0,0,0", "-o", "r.png"], "must have a direction");
     refused(path, &["bench", "builtin:cornell", "--engines", "scaler"], "scalar");
     refused(path, &["bench", "--threads", "0"], "threads");
     assert_eq!(binary::files(path), Vec::<String>::new(), "refusals leave no files");

@@ -30,7 +30,7 @@ pub struct CameraArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, help_heading = "Camera")]
     pub look_at: Option<DVec3>,
     /// Up vector
-    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true, help_heading = "Camera")]
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true, help_heading = "Camera")]
     pub up: Option<DVec3>,
     /// Vertical field of view
     #[arg(long, value_name = "DEGREES", value_parser = field_of_view, help_heading = "Camera")]
@@ -147,6 +147,14 @@ fn point(text: &str) -> std::result::Result<DVec3, String> {
     }
 }
 
+/// As scene files have it: without a direction the camera would take another, and nobody would know.
+fn direction(text: &str) -> std::result::Result<DVec3, String> {
+    let has_direction = |v: &DVec3| v.try_normalize().is_some();
+    Some(point(text)?)
+        .filter(has_direction)
+        .ok_or_else(|| "it must have a direction: its length is zero or out of range".into())
+}
+
 fn field_of_view(text: &str) -> std::result::Result<f64, String> {
     let degrees = text.parse().ok().filter(|&d: &f64| d > 0.0 && d < 180.0);
     degrees.ok_or_else(|| "expected degrees between 0 and 180".into())
@@ -171,6 +179,11 @@ mod tests {
         for wrong in ["1,2", "1,2,3,4", "a,b,c", "1,2,inf", ""] {
             assert!(point(wrong).is_err(), "{wrong}");
         }
+        assert_eq!(direction("0,0,-2"), Ok(DVec3::new(0.0, 0.0, -2.0)));
+        for wrong in ["0,0,0", "1e-200,0,0", "0,1e200,0"] {
+            assert!(direction(wrong).unwrap_err().contains("must have a direction"), "{wrong}");
+        }
+        assert!(direction("0,1").unwrap_err().contains("three finite numbers"));
         assert_eq!(field_of_view("45"), Ok(45.0));
         assert!(field_of_view("180").is_err() && field_of_view("nan").is_err());
     }
