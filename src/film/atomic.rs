@@ -13,7 +13,7 @@ pub type Writer<'a> = BufWriter<&'a mut File>;
 ///
 /// If `write` fails or panics, or the disk is full, the old file stays as it was and the temporary file is removed.
 /// A killed process leaves the old file (and may leave a hidden `.NAME.*.tmp` beside it). A symbolic link is
-/// followed: the file it names is replaced. The new file gets the rights that any new file gets here.
+/// followed: the file it names is replaced, or made. The new file gets the rights that any new file gets here.
 ///
 /// # Errors
 /// [`Error::Io`] with `path` for whatever `write` or the system report; also if `path` is a directory or device,
@@ -85,7 +85,11 @@ fn resolve(path: &Path) -> io::Result<PathBuf> {
     match std::fs::metadata(path) {
         Ok(meta) if meta.is_file() => std::fs::canonicalize(path),
         Ok(_) => Err(io::Error::new(io::ErrorKind::InvalidInput, "expected a regular file or a new name to write to")),
-        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(path.to_path_buf()),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => match std::fs::symlink_metadata(path) {
+            // A link to what is not there yet, perhaps through another; the system finds links in a circle above.
+            Ok(meta) if meta.is_symlink() => resolve(&folder_of(path).join(std::fs::read_link(path)?)),
+            _ => Ok(path.to_path_buf()),
+        },
         Err(e) => Err(e),
     }
 }
@@ -225,6 +229,18 @@ mod tests {
         write_atomically(&link, |w| w.write_all(b"new")).unwrap();
         assert_eq!(fs::read(&real).unwrap(), b"new");
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        // A link to what is not there yet: that is made, through however many links.
+        let (dangling, before, made) =
+            (dir.path().join("dangling"), dir.path().join("before"), dir.path().join("made"));
+        std::os::unix::fs::symlink("made", &dangling).unwrap();
+        std::os::unix::fs::symlink(&dangling, &before).unwrap();
+        check_file(&before).unwrap();
+        write_atomically(&before, |w| w.write_all(b"new")).unwrap();
+        assert_eq!(fs::read(&made).unwrap(), b"new");
+        assert!([&before, &dangling].iter().all(|link| fs::symlink_metadata(link).unwrap().is_symlink()));
+        let circle = dir.path().join("circle");
+        std::os::unix::fs::symlink("circle", &circle).unwrap();
+        assert!(check_file(&circle).is_err() && write_atomically(&circle, |w| w.write_all(b"new")).is_err());
         // The same rights as a file that std creates under this umask.
         let rights = |p: &Path| fs::metadata(p).unwrap().permissions().mode();
         let plain = dir.path().join("plain");
