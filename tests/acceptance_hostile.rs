@@ -159,6 +159,9 @@ fn scene_files() {
     render("long.kdl", &[b"sphere radius=".as_slice(), &vec![b'x'; 8 << 20]].concat(), Place::Line, "");
     render("bytes.kdl", b"sphere\n\xff\xfe", Place::Line, "");
     render("many.kdl", b"define a { repeat 100000 { repeat 100000 { sphere } } }\ninstance a\n", Place::Line, "");
+    let next = |level: usize| format!("define g{level} {{ {}}}\n", format!("instance g{}; ", level + 1).repeat(20));
+    let nested = format!("{}define g20 {{ sphere }}\ninstance g0\n", (0..20).map(next).collect::<String>());
+    render("nested.kdl", nested.as_bytes(), Place::File, "more than 16777216 instances");
     render("lie.kdl", b"mesh \"none.ply\"\n", Place::Line, "none.ply");
 }
 

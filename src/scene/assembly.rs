@@ -140,13 +140,11 @@ impl Assembly {
                 objects.push(object);
             }
         }
-        let mut walk = Walk {
-            description,
-            object_of_group: &object_of_group,
-            placements: Vec::new(),
-            path: Vec::new(),
-            visits: 0,
-        };
+        let known = vec![None; description.groups.len()];
+        let mut counting = Counting { description, object_of_group: &object_of_group, known, path: Vec::new() };
+        let extent = counting.group(0).map_err(fail)?;
+        let placements = Vec::with_capacity(extent.placements as usize);
+        let mut walk = Walk { description, object_of_group: &object_of_group, placements };
         walk.group(0, DAffine3::IDENTITY).map_err(fail)?;
         Ok(Self { placements: walk.placements, objects })
     }
@@ -164,46 +162,128 @@ impl Assembly {
     }
 }
 
+/// What a group expands to, itself included.
+#[derive(Clone, Copy)]
+struct Extent {
+    /// Placements of groups that have geometry.
+    placements: u64,
+    /// Placements of all groups.
+    visits: u64,
+    /// Levels of groups.
+    levels: usize,
+}
+
+/// Counts what groups expand to, each group once however often it is placed: what is too much is refused before any of it is made.
+struct Counting<'a> {
+    description: &'a Description,
+    object_of_group: &'a [Option<u32>],
+    known: Vec<Option<Extent>>,
+    path: Vec<GroupId>,
+}
+
+impl Counting<'_> {
+    fn group(&mut self, id: GroupId) -> std::result::Result<Extent, String> {
+        if let Some(known) = self.known[id as usize] {
+            return Ok(known);
+        }
+        let group = &self.description.groups[id as usize];
+        if self.path.contains(&id) {
+            return Err(format!("group `{}` contains an instance of itself", group.name));
+        }
+        let too_deep = || format!("groups nest deeper than {MAX_NESTING} levels at `{}`", group.name);
+        if self.path.len() >= MAX_NESTING {
+            return Err(too_deep());
+        }
+        self.path.push(id);
+        let placements = u64::from(self.object_of_group[id as usize].is_some());
+        let mut extent = Extent { placements, visits: 1, levels: 1 };
+        for item in &group.items {
+            let ItemKind::Instance(child) = item.kind else { continue };
+            let inner = self.group(child)?;
+            extent.placements = extent.placements.saturating_add(inner.placements);
+            extent.visits = extent.visits.saturating_add(inner.visits);
+            extent.levels = extent.levels.max(1 + inner.levels);
+        }
+        self.path.pop();
+        if extent.levels > MAX_NESTING {
+            return Err(too_deep());
+        }
+        if extent.placements > MAX_PLACEMENTS {
+            return Err(format!("more than {MAX_PLACEMENTS} instances"));
+        }
+        // Groups without geometry place nothing, but doubling them is as endless as doubling instances.
+        if extent.visits > 2 * MAX_PLACEMENTS {
+            return Err(format!("groups expand to more than {} instances", 2 * MAX_PLACEMENTS));
+        }
+        self.known[id as usize] = Some(extent);
+        Ok(extent)
+    }
+}
+
+/// Places what was counted.
 struct Walk<'a> {
     description: &'a Description,
     object_of_group: &'a [Option<u32>],
     placements: Vec<Placement>,
-    path: Vec<GroupId>,
-    visits: u64,
 }
 
 impl Walk<'_> {
     fn group(&mut self, id: GroupId, to_world: DAffine3) -> std::result::Result<(), String> {
         let group = &self.description.groups[id as usize];
-        if self.path.contains(&id) {
-            return Err(format!("group `{}` contains an instance of itself", group.name));
-        }
-        if self.path.len() >= MAX_NESTING {
-            return Err(format!("groups nest deeper than {MAX_NESTING} levels at `{}`", group.name));
-        }
-        // Groups without geometry place nothing, but doubling them is as endless as doubling instances.
-        self.visits += 1;
-        if self.visits > 2 * MAX_PLACEMENTS {
-            return Err(format!("groups expand to more than {} instances", 2 * MAX_PLACEMENTS));
-        }
         if let Some(object) = self.object_of_group[id as usize] {
             let determinant = to_world.matrix3.determinant();
             let finite = to_world.is_finite() && to_world.inverse().is_finite();
             if determinant == 0.0 || !finite {
                 return Err(format!("an instance of `{}` has a transform that cannot be inverted", group.name));
             }
-            if self.placements.len() as u64 >= MAX_PLACEMENTS {
-                return Err(format!("more than {MAX_PLACEMENTS} instances"));
-            }
             self.placements.push(Placement { object, to_world });
         }
-        self.path.push(id);
         for item in &group.items {
             if let ItemKind::Instance(child) = item.kind {
                 self.group(child, to_world * item.transform)?;
             }
         }
-        self.path.pop();
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::description::{Group, Item};
+
+    /// Groups in a row, each of which holds `copies` instances of the next; the last holds a sphere, if `has_sphere`.
+    fn chain(groups: u32, copies: usize, has_sphere: bool) -> Description {
+        let mut d = Description::new("chain");
+        let item = |kind| Item { transform: DAffine3::IDENTITY, material: None, kind };
+        let holding = |next| vec![item(ItemKind::Instance(next)); copies];
+        d.groups = (1..groups).map(|next| Group { name: format!("g{next}"), items: holding(next) }).collect();
+        let last = has_sphere.then(|| item(ItemKind::Shape(Shape::Sphere)));
+        d.groups.push(Group { name: "last".into(), items: last.into_iter().collect() });
+        d
+    }
+
+    #[test]
+    fn what_expands_too_far_is_refused_before_it_is_made() {
+        let made = |d: &Description| Assembly::new(d).map(|a| a.placements.len()).map_err(|e| e.to_string());
+        assert_eq!(made(&chain(4, 3, true)), Ok(27));
+        assert_eq!(made(&chain(4, 3, false)), Ok(0));
+        assert_eq!(made(&chain(MAX_NESTING as u32, 1, true)), Ok(1));
+        // Made one by one, these would take gigabytes, or longer than anybody waits.
+        let start = std::time::Instant::now();
+        for (d, what) in [
+            (chain(20, 20, true), "more than 16777216 instances"),
+            (chain(26, 2, true), "more than 16777216 instances"),
+            (chain(64, 100, false), "expand to more than 33554432 instances"),
+            (chain(MAX_NESTING as u32 + 1, 1, true), "nest deeper than 64 levels"),
+        ] {
+            let text = made(&d).unwrap_err();
+            assert!(text.contains(what), "{text}");
+        }
+        assert!(start.elapsed().as_secs_f64() < 1.0, "{:?}", start.elapsed());
+        let mut circle = chain(3, 2, true);
+        let back = circle.groups[0].items[0].clone();
+        circle.groups[2].items.push(back);
+        assert!(made(&circle).unwrap_err().contains("contains an instance of itself"));
     }
 }
