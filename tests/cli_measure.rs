@@ -83,6 +83,32 @@ fn bench_prints_a_table_and_writes_rows_facts_and_a_picture() {
     assert!(facts.contains(said) && said.contains(" GHz: multiply") && said.contains(" per cycle"), "{said}");
 }
 
+/// A picture that fills none of its four tiles but one has as many rays as pixels, for engines, peers and rates alike.
+#[test]
+fn rays_are_pixels_of_the_picture() {
+    let dir = square();
+    let line = "bench square.ply --size 33x33 --rays primary,camera,ao,diffuse2,scatter --engines scalar,tile \
+                --peers obvhs --repeat 1 --threads 1 --json -o out";
+    let report = run(&dir, line).json();
+    let rows = report["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 5 * (2 + 2), "{report}");
+    for row in rows {
+        assert_eq!(row["rays"], 33 * 33, "{row}");
+    }
+    let csv = std::fs::read_to_string(dir.path().join("out/bench.csv")).expect("rows");
+    let mut reader = csv::Reader::from_reader(csv.as_bytes());
+    let header = reader.headers().expect("a header").clone();
+    for row in reader.records() {
+        let row = row.expect("a row");
+        let number = |name: &str| -> f64 {
+            let column = header.iter().position(|h| h == name).expect("the column");
+            row[column].parse().expect("a number")
+        };
+        let rate = 33.0 * 33.0 / number("seconds") / 1e6;
+        assert!((number("median_mrays_per_s") / rate - 1.0).abs() < 0.01, "{row:?}");
+    }
+}
+
 /// Two files of one name, the second a triangle: a heading, a name in the rows and a picture for each.
 #[test]
 fn scenes_of_one_name_have_rows_and_pictures_of_their_own() {

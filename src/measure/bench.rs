@@ -82,7 +82,8 @@ pub fn scene<S: Engines>(
     };
     let guests = plan.peers.open(&world, workers)?;
     let costs = explain::is_of_triangles(&world).then(|| workers.install(explain::costs::<S>));
-    let subject = Subject { workers, world: &world, oracle: &oracle, facts, engines, guests, costs };
+    let subject =
+        Subject { workers, world: &world, oracle: &oracle, facts, pixels: view.pixels, engines, guests, costs };
     for &kind in &plan.kinds {
         if kind == RayKind::Camera {
             let batches = workers.install(|| view.made::<S>());
@@ -117,6 +118,8 @@ struct Subject<'a, S: 'static> {
     world: &'a World<S>,
     oracle: &'a Oracle,
     facts: SceneFacts,
+    /// Of the picture.
+    pixels: u64,
     engines: Vec<&'static dyn Engine<S>>,
     guests: Vec<Guest<S>>,
     /// Of single tests, if the scene is of triangles.
@@ -136,10 +139,12 @@ impl<S: Engines> Subject<'_, S> {
         report: &mut dyn FnMut(Row),
     ) -> Result<()> {
         let (query, batches) = (kind.query(), load.batches);
-        let rays: u64 = batches.iter().map(|b| b.len() as u64).sum();
+        let slots: u64 = batches.iter().map(|b| b.len() as u64).sum();
+        // Tiles go beyond the picture where its sides are no multiples of theirs; what they hold there is no ray of anybody's.
+        let rays = if kind == RayKind::Scatter { slots } else { self.pixels };
         let mut scalar = Answers::new(query, batches);
         self.workers.pass(engine::<S>("scalar")?, self.world, batches, &mut scalar);
-        let rejected = self.rejected(batches, &scalar, rays);
+        let rejected = self.rejected(batches, &scalar, slots);
 
         let (mut series, mut entries) = (Vec::new(), Vec::new());
         for (workers, tracer) in self.tracers() {
@@ -148,7 +153,7 @@ impl<S: Engines> Subject<'_, S> {
             }
             let admission = match tracer {
                 Tracer::Engine(engine) => self.admit(workers, engine, load, &scalar, rejected.as_deref()),
-                Tracer::Peer(peer) => self.admit_peer(peer, batches, &scalar),
+                Tracer::Peer(peer) => self.admit_peer(peer, batches, &scalar, rays),
             };
             entries.push(Entry {
                 workers,
@@ -252,11 +257,11 @@ impl<S: Engines> Subject<'_, S> {
     }
 
     /// A peer's answers, if all but a handful are ours up to rounding, or the oracle explains ours and all but a handful of them where
-    /// they are not.
-    fn admit_peer(&self, peer: &dyn Peer<S>, batches: &[Rays<S>], scalar: &Answers<S>) -> Admission<S> {
+    /// they are not; a handful is a share of `rays`.
+    fn admit_peer(&self, peer: &dyn Peer<S>, batches: &[Rays<S>], scalar: &Answers<S>, rays: u64) -> Admission<S> {
         let mut answers = scalar.clone();
         self.workers.peer_pass(peer, batches, &mut answers);
-        let agreement = compare_traced(batches, scalar, &answers);
+        let agreement = Agreement { rays, ..compare_traced(batches, scalar, &answers) };
         let mut why = String::new();
         let passes = agreement.passes_if(|| {
             let both = [scalar, &answers];
@@ -277,11 +282,11 @@ impl<S: Engines> Subject<'_, S> {
     }
 
     /// The oracle's objection to a sample of the `scalar` engine's answers.
-    fn rejected(&self, batches: &[Rays<S>], scalar: &Answers<S>, rays: u64) -> Option<String> {
+    fn rejected(&self, batches: &[Rays<S>], scalar: &Answers<S>, slots: u64) -> Option<String> {
         // Above 10^5 primitives the oracle has a tree of its own.
         let cost = self.world.assembly.instanced_prims().clamp(1, 100_000);
         let sample = (ORACLE_LIMIT / cost).clamp(1, ORACLE_RAYS);
-        let stride = rays.div_ceil(sample).max(1) as usize;
+        let stride = slots.div_ceil(sample).max(1) as usize;
         let counts = self.workers.install(|| truth::judge(self.oracle, MARGIN_FACTOR, batches, scalar, stride));
         let total = counts.total();
         let first = counts.samples.first()?;

@@ -111,7 +111,7 @@ pub struct Row {
     pub precision: &'static str,
     /// Threads that traced.
     pub threads: usize,
-    /// Rays in the set, dead ones included.
+    /// Rays in the set, dead ones included: one for each pixel of the picture, or scattered ones.
     pub rays: u64,
     /// Rays with `scalar`'s t and another primitive: shared edges, coincident surfaces.
     pub ties: u64,
