@@ -189,7 +189,7 @@ fn scaling_has_rows_of_each_number_of_threads() {
 fn peers_are_rows_and_a_missing_one_says_so() {
     let dir = square();
     let line = "bench square.ply --size 64x32 --rays primary,ao --engines scalar,packet8 --repeat 3 \
-                --peers obvhs,embree --embree nowhere.so --json";
+                --peers obvhs,embree,obvhs --embree nowhere.so --json";
     let report = run(&dir, line).json();
     let rows = report["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 10, "2 classes x (2 engines, 2 trees of obvhs, no Embree): {report}");
@@ -368,8 +368,8 @@ fn an_interrupted_bench_ends_with_130_and_valid_output() {
 #[test]
 fn two_runs_are_compared() {
     let dir = square();
-    // `auto` is `tile` here: one row, or the file could not be compared.
-    let bench = "bench square.ply --rays primary --engines scalar,tile,auto --size 32x32 --repeat 3 --threads 1 -o";
+    // `auto` is `tile` here: one row, or the file could not be compared; nor could it with a class twice.
+    let bench = "bench square.ply --rays primary,primary --engines scalar,tile,auto --size 32x32 --repeat 3 --threads 1 -o";
     run(&dir, &format!("{bench} old"));
     run(&dir, &format!("{bench} new"));
     let text = run(&dir, "bench --compare old new/bench.csv").out;

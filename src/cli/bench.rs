@@ -228,7 +228,8 @@ fn say_ports(ports: &Ports, output: &OutputArgs) {
 /// All scenes; finished rows are in `rows` also when a later scene fails.
 fn measure(args: &BenchArgs, workers: &Workers, rows: &mut Vec<Row>) -> Result<()> {
     let scenes = scenes(args);
-    let bar = args.output.progress_bar((scenes.len() * args.rays.len()) as u64, "measuring");
+    let classes = RayKind::each_once(&args.rays).len();
+    let bar = args.output.progress_bar((scenes.len() * classes) as u64, "measuring");
     let mut names = Vec::new();
     for scene in &scenes {
         let mut description = args.options.seen_by(scene, &args.camera)?.load(scene, &args.output)?;
@@ -292,7 +293,7 @@ fn one<S: Engines>(
 ) -> Result<()> {
     let size = args.camera.size.unwrap_or(DEFAULT_SIZE);
     let plan = Plan {
-        kinds: args.rays.clone(),
+        kinds: RayKind::each_once(&args.rays),
         engines: args.engines.clone(),
         size,
         repeat: args.repeat,

@@ -130,6 +130,12 @@ impl RayKind {
         }
     }
 
+    /// `kinds`, each once, in the order in which they come first: a class measured twice would be two rows about the same.
+    pub fn each_once(kinds: &[Self]) -> Vec<Self> {
+        let is_first = |(i, kind): &(usize, &Self)| !kinds[..*i].contains(kind);
+        kinds.iter().enumerate().filter(is_first).map(|(_, kind)| *kind).collect()
+    }
+
     /// The class whose hits these rays start from; `None` if they start from none.
     pub fn parent(self) -> Option<Self> {
         match self {

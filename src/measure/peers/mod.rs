@@ -123,7 +123,9 @@ impl Invitation {
         };
         let mut guests = Vec::new();
         let mut add = |name, modes: Modes| guests.push(Guest { name, modes: modes.and_then(of_precision) });
-        for name in self.names.iter().filter_map(|name| NAMES.into_iter().find(|known| known == name)) {
+        // Twice would be two rows about the same.
+        let once = (0..self.names.len()).filter(|&i| !self.names[..i].contains(&self.names[i]));
+        for name in once.filter_map(|i| NAMES.into_iter().find(|known| *known == self.names[i])) {
             match name {
                 "obvhs" => obvhs::NAMES.into_iter().for_each(|family| {
                     add(family, with(&|triangles| obvhs::build(family, triangles).map(|peer| vec![peer])));
