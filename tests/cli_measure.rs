@@ -369,7 +369,8 @@ fn an_interrupted_bench_ends_with_130_and_valid_output() {
 fn two_runs_are_compared() {
     let dir = square();
     // `auto` is `tile` here: one row, or the file could not be compared; nor could it with a class twice.
-    let bench = "bench square.ply --rays primary,primary --engines scalar,tile,auto --size 32x32 --repeat 3 --threads 1 -o";
+    let bench =
+        "bench square.ply --rays primary,primary --engines scalar,tile,auto --size 32x32 --repeat 3 --threads 1 -o";
     run(&dir, &format!("{bench} old"));
     run(&dir, &format!("{bench} new"));
     let text = run(&dir, "bench --compare old new/bench.csv").out;
@@ -492,8 +493,8 @@ fn pictures_beyond_all_memory_are_refused() {
 fn experiments_resume_where_they_were() {
     let dir = square();
     let at = |name: &str| dir.path().join(name);
-    let text = "experiment \"tiny\" {\n question \"is it there?\"\n scenes square.ply\n rays primary diffuse\n \
-                engines scalar packet4\n size \"32x32\" \"64x64\"\n repeat 3\n}";
+    let text = "experiment \"tiny\" {\n question \"is it there?\"\n scenes square.ply\n rays primary diffuse primary\n \
+                engines scalar packet4 scalar\n size \"32x32\" \"64x64\"\n repeat 3\n}";
     std::fs::write(at("tiny.kdl"), text).expect("a file");
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_lanecast"))
         .args(["bench", "--experiment", "tiny.kdl", "-o", "out", "-q"])
@@ -509,7 +510,8 @@ fn experiments_resume_where_they_were() {
     let _gone = child.kill();
     child.wait().expect("it ended");
     let kept = std::fs::read_to_string(&first).expect("rows");
-    assert!(kept.contains("lanecast bench square.ply --rays primary --engines scalar,packet4 --size 32x32"), "{kept}");
+    assert!(kept.contains("lanecast bench square.ply --rays primary --engines scalar,packet4,scalar --size"), "{kept}");
+    assert_eq!(kept.lines().count(), 1 + 2, "each engine once: {kept}");
     let ended = run(&dir, "bench --experiment tiny.kdl -o out");
     assert!(ended.err.contains("of 4 steps are finished already"), "{}", ended.err);
     assert_eq!(std::fs::read_to_string(&first).expect("rows"), kept, "nothing is measured twice");

@@ -154,6 +154,8 @@ impl Reader<'_, '_> {
             return Err(self.source.error(self.node.span, "expected `scenes` with at least one scene"));
         }
         let rays = self.each("rays", "primary", |text| text.parse::<RayKind>().map_err(|e| e.to_string()))?;
+        // Each class is one step in one folder.
+        let rays = RayKind::each_once(&rays);
         let (engines, peers) = (self.texts("engines")?, self.texts("peers")?);
         let number =
             |text: &str| text.parse::<u32>().ok().filter(|&n| n > 0).ok_or("expected a whole number above 0".into());

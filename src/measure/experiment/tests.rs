@@ -36,6 +36,8 @@ fn cases_are_the_product() {
     assert_eq!(e.cases[0].label(), "terrain-size-10-seed-1-64x32-t1-fast-leaf-2-f32");
     let small = parsed("experiment \"x\" { scenes \"builtin:cornell\"; }").unwrap();
     assert_eq!((small.cases.len(), small.rays), (1, vec![RayKind::Primary]));
+    let twice = parsed("experiment \"x\" { scenes a; rays primary ao primary; }").unwrap();
+    assert_eq!(twice.rays, [RayKind::Primary, RayKind::Ao]);
 }
 
 #[test]
@@ -60,6 +62,8 @@ fn faults_say_where_and_what_is_near() {
         ("experiment \"x\" { scenes a {\n}}", "values only"),
         ("experiment \"x\" { scenes #null }", "a word or a number"),
         ("experiment \"x\" { scenes \"a/x.ply\" \"b/x.ply\" }", "two cases are called `x-"),
+        ("experiment \"x\" { scenes a a }", "two cases are called `a-"),
+        ("experiment \"x\" { scenes a\n threads 1 1 }", "two cases are called `a-"),
         ("experiment \"x\" {", "e.kdl:1:"),
     ] {
         assert!(fault(text).contains(want), "{text}: {}", fault(text));
