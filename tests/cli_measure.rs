@@ -192,6 +192,8 @@ fn peers_are_rows_and_a_missing_one_says_so() {
                 --peers obvhs,embree,obvhs --embree nowhere.so --json";
     let report = run(&dir, line).json();
     let rows = report["rows"].as_array().expect("rows");
+    assert!(report["run"]["rustc"].as_str().is_some_and(|name| name.starts_with("rustc ")), "{}", report["run"]);
+    assert!(report["run"]["flags"].is_string(), "{}", report["run"]);
     assert_eq!(rows.len(), 10, "2 classes x (2 engines, 2 trees of obvhs, no Embree): {report}");
     let rate = report["ports"]["multiply_add"]["per_cycle"].as_f64();
     assert!(rate.is_some_and(|rate| (0.2..8.0).contains(&rate)), "{}", report["ports"]);

@@ -64,7 +64,8 @@ mod tests {
     fn every_run_gets_a_folder_of_its_own() {
         let root = tempfile::tempdir().unwrap();
         let (date, cpu, command) = ["2026-01-31T00:00:00Z", "AMD EPYC(tm) 9R14", "x"].map(String::from).into();
-        let run = Run { date, revision: "0123456789ab-dirty", isa: "avx512", cpu, threads: 1, command };
+        let run =
+            Run { date, revision: "0123456789ab-dirty", isa: "avx512", flags: "", rustc: "", cpu, threads: 1, command };
         let first = folder(root.path(), &run, "Sponza: atrium").unwrap();
         let end = "amd-epyc-tm-9r14-avx512/2026-01-31-0123456-dirty/sponza-atrium";
         assert_eq!(first, root.path().join(end));

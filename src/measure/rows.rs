@@ -15,6 +15,10 @@ pub struct Run {
     pub revision: &'static str,
     /// Instruction set of the build.
     pub isa: &'static str,
+    /// Compiler flags of the build.
+    pub flags: &'static str,
+    /// Its compiler: `rustc --version`.
+    pub rustc: &'static str,
     /// CPU model.
     pub cpu: String,
     /// Threads that traced, at most.
@@ -30,6 +34,8 @@ impl Run {
             date: env::now(),
             revision: env::REVISION,
             isa: compiled_isa(),
+            flags: env::FLAGS,
+            rustc: env::RUSTC,
             cpu: env::cpu_model(),
             threads,
             command: env::command_line(),
@@ -149,7 +155,7 @@ pub fn csv(run: &Run, rows: &[Row]) -> String {
 
 fn line(run: &Run, row: &Row) -> String {
     let scene = &row.scene;
-    let mut cells: Vec<String> = [run.revision, &run.date, &run.cpu, run.isa, env::FLAGS].map(String::from).into();
+    let mut cells: Vec<String> = [run.revision, &run.date, &run.cpu, run.isa, run.flags].map(String::from).into();
     cells.extend([row.threads.to_string(), scene.name.clone(), scene.hash.clone(), scene.prims.to_string()]);
     cells.extend([row.class, row.query, row.engine, row.precision].map(String::from));
     cells.push(row.rays.to_string());
@@ -205,8 +211,7 @@ fn quoted(cell: &str) -> String {
 pub fn table(rows: &[Row]) -> String {
     let shown: Vec<&Row> = rows.iter().filter(|row| row.peer.as_ref().is_none_or(|peer| peer.quoted)).collect();
     let width = shown.iter().map(|row| label(row).len()).max().unwrap_or(0).max("engine".len());
-    let mut text = String::new();
-    let mut scene = None;
+    let (mut text, mut scene) = (String::new(), None);
     for row in shown {
         if scene != Some(&row.scene.name) {
             scene = Some(&row.scene.name);
@@ -321,7 +326,7 @@ mod tests {
 
     fn run() -> Run {
         let (date, cpu, command) = ["2026-01-31T00:00:00Z", "CPU", "lanecast bench"].map(String::from).into();
-        Run { date, revision: "0123456789ab", isa: "avx2", cpu, threads: 4, command }
+        Run { date, revision: "0123456789ab", isa: "avx2", flags: "-O", rustc: "rustc 1", cpu, threads: 4, command }
     }
 
     /// Reads a CSV line by the rules of RFC 4180.
@@ -354,7 +359,7 @@ mod tests {
         let cell = |row: usize, name: &str| {
             lines[row][lines[0].iter().position(|c| c == name).unwrap_or_else(|| panic!("no column {name}"))].clone()
         };
-        assert_eq!(cell(1, "scene"), "a, \"b\"");
+        assert_eq!((cell(1, "scene"), cell(1, "flags")), ("a, \"b\"".into(), "-O".into()));
         assert_eq!(cell(1, "best_mrays_per_s"), "4.0000");
         assert_eq!(cell(1, "median_mrays_per_s"), "2.0000");
         assert_eq!(cell(1, "spread"), "0.5000");

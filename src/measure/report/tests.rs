@@ -42,7 +42,7 @@ fn run(folder: &Path, revision: &'static str, threads: usize, rows: &[Row]) {
     std::fs::create_dir_all(folder).unwrap();
     let (date, cpu) = (format!("2026-01-0{threads}T00:00:00Z"), "A <fast> CPU".to_string());
     let command = format!("lanecast bench 'a & b.ply' --threads {threads}");
-    let run = Run { date, revision, isa: "avx2", cpu, threads, command };
+    let run = Run { date, revision, isa: "avx2", flags: "", rustc: "", cpu, threads, command };
     let rows: Vec<Row> = rows.iter().map(|row| Row { threads, ..row.clone() }).collect();
     std::fs::write(folder.join("bench.csv"), rows::csv(&run, &rows)).unwrap();
     std::fs::write(folder.join("bench.env.txt"), "cpu: A <fast> CPU\nrustc: rustc 1\nload average: 1 2 3\n").unwrap();
