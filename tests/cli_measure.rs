@@ -418,6 +418,7 @@ fn programs_take_turns_and_are_compared() {
     assert!(again.contains("2 rows compared"), "{again}");
     binary::refused(dir.path(), &["bench", "--against", "nowhere/lanecast"], "nowhere/lanecast");
     binary::refused(dir.path(), &words.split(' ').collect::<Vec<_>>(), "earlier run");
+    binary::refused(dir.path(), &["bench", "square.ply", "--against", "true"], "true bench: wrote no rows");
     for (bad, what) in [("bench none.ply", "none.ply"), ("bench square.ply --engines scaler", "scalar")] {
         let line = format!("{bad} --against {own} -o bad");
         binary::refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);

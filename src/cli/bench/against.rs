@@ -13,7 +13,7 @@ use crate::measure::compare::{self, Change};
 /// `folder/old/NN` and `folder/new/NN`.
 ///
 /// # Errors
-/// [`Error::Usage`] if `folder` holds turns already or a program refuses the words; [`Error::Io`] if a program cannot be run,
+/// [`Error::Usage`] if `folder` holds turns already, or a program refuses the words or writes no rows; [`Error::Io`] if a program cannot be run,
 /// [`Error::Mismatch`] if one fails; [`Error::Interrupted`].
 pub fn run(other: &Path, turns: u32, folder: &Path, output: &OutputArgs) -> Result<Vec<Change>> {
     let own = std::env::current_exe().map_err(|e| Error::io("the running program", e))?;
@@ -45,7 +45,11 @@ fn one(program: &Path, words: &[OsString], folder: &Path) -> Result<()> {
     let status = command.status().map_err(|e| Error::io(program, e))?;
     // A row with wrong hits (exit code 1) has no figure; the others still compare.
     match status.code() {
-        Some(0 | 1) => Ok(()),
+        Some(0 | 1) if folder.join("bench.csv").is_file() => Ok(()),
+        Some(0 | 1) => {
+            let what = "wrote no rows: expected a lanecast, which leaves bench.csv in the folder after -o";
+            Err(Error::Usage(format!("{} bench: {what}", program.display())))
+        }
         Some(2) => Err(Error::Usage(format!("{} bench: bad usage or input", program.display()))),
         Some(130) => Err(Error::Interrupted),
         _ => Err(Error::Mismatch(format!("{} bench: {status}", program.display()))),
