@@ -199,3 +199,33 @@ fn refusals_leave_no_files() {
     }
     assert_eq!(files(dir.path()), before);
 }
+
+/// What an error says would fit does: of meshes, of voxels and of their faces, which need more than their flags.
+#[test]
+fn what_is_said_to_fit_fits() {
+    let dir = folder();
+    for (line, option) in [
+        ("-o a.stl --cells 6000 --memory 8", "--cells"),
+        ("-o a.stl --cells 60 --memory 2", "--cells"),
+        ("-o a.stl --tolerance 0.001 --memory 4", "--cells"),
+        ("-o a.stl --tolerance 0.001 --memory 8", "--cells"),
+        ("-o a.stl --voxels 6000 --memory 8", "--voxels"),
+        ("-o a.stl --voxels 100 --memory 8", "--voxels"),
+        ("-o a.npy --voxels 6000 --memory 8", "--voxels"),
+        ("-o a.npy --voxels 6000 --memory 8", "--tolerance"),
+    ] {
+        let start = "convert builtin:bolt --solid bolt";
+        let words = format!("{start} {line}");
+        let ended = lanecast(dir.path(), &words.split(' ').collect::<Vec<_>>());
+        assert_eq!(ended.code, Some(2), "{line}: {}", ended.err);
+        let rest = ended.err.split(&format!("{option} ")).nth(1);
+        let number = rest.and_then(|rest| rest.split([' ', ',', ';']).next());
+        let number = number.unwrap_or_else(|| panic!("{line}: {option} in {}", ended.err));
+        let (file, memory) = (&line[..8], line.rsplit(' ').next().expect("a number"));
+        let words = format!("{start} {file} {option} {number} --memory {memory}");
+        let fitting = lanecast(dir.path(), &words.split(' ').collect::<Vec<_>>());
+        assert_eq!(fitting.code, Some(0), "{words}: {}", fitting.err);
+    }
+    let line = "convert builtin:bolt --solid bolt -o a.stl --cells 50 --memory 0";
+    refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), "no coarser one fits");
+}

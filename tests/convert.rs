@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use common::Random;
 use glam::{DAffine3, DQuat, DVec3};
 use lanecast::convert::nearby::from_triangle;
-use lanecast::convert::{Fineness, Solids, Surface, Voxels, Watch, surface};
+use lanecast::convert::{Fineness, Solids, Surface, Voxels, Wanted, Watch, surface};
 use lanecast::reference::Oracle;
 use lanecast::scene::description::{Description, ItemKind, Shape};
 use lanecast::scene::load::{LoadOptions, load};
@@ -302,7 +302,7 @@ fn rays_see_the_same_solid() {
 fn voxels_of_a_ball_and_a_box() {
     let solids = Solids::new(&one(solids::ball(DVec3::new(1.0, 2.0, 3.0), 1.0).unwrap()), &[]).unwrap();
     let fineness = Fineness { tolerance: 0.1, cells: None, memory: MEMORY };
-    let found = Voxels::new(&solids, 0.07, &fineness, &Watch::NONE).unwrap();
+    let found = Voxels::new(&solids, 0.07, Wanted::Faces, &fineness, &Watch::NONE).unwrap();
     let [nx, ny, nz] = found.size;
     let flags: Vec<u8> = found.planes().flatten().collect();
     assert_eq!(flags.len(), nx * ny * nz);
@@ -318,7 +318,7 @@ fn voxels_of_a_ball_and_a_box() {
     assert!((mesh.volume() / (count as f64 * 0.07f64.powi(3)) - 1.0).abs() < 1e-5);
 
     let solids = Solids::new(&one(cuboid(DVec3::ZERO, DVec3::new(4.0, 3.0, 2.0))), &[]).unwrap();
-    let found = Voxels::new(&solids, 0.5, &fineness, &Watch::NONE).unwrap();
+    let found = Voxels::new(&solids, 0.5, Wanted::Faces, &fineness, &Watch::NONE).unwrap();
     assert_eq!((found.size, found.count()), ([8, 6, 4], 8 * 6 * 4));
     let (mesh, _) = found.mesh(&fineness).unwrap();
     assert_eq!((manifold(&mesh, "voxels of a box"), mesh.triangles.len()), (2, 4 * (8 * 6 + 6 * 4 + 8 * 4)));
@@ -330,7 +330,7 @@ fn voxels_of_a_ball_and_a_box() {
 fn voxels_of_a_lattice() {
     let solids = Solids::new(&tree("lattice", NodeKind::Union, lattice()), &[]).unwrap();
     let fineness = Fineness { tolerance: 0.1, cells: None, memory: MEMORY };
-    let found = Voxels::new(&solids, 1.0, &fineness, &Watch::NONE).unwrap();
+    let found = Voxels::new(&solids, 1.0, Wanted::Faces, &fineness, &Watch::NONE).unwrap();
     assert_eq!(found.count(), 14);
     let (mesh, topology) = found.mesh(&fineness).unwrap();
     manifold(&mesh, "voxels of a lattice");
@@ -356,7 +356,7 @@ fn what_cannot_be_converted_is_refused() {
     let solids = Solids::new(&one(solids::ball(DVec3::ZERO, 1.0).unwrap()), &[]).unwrap();
     let fine = |memory, cells| surface(&solids, &Fineness { tolerance: 1e-6, cells, memory }, &Watch::NONE);
     assert!(fine(MEMORY, Some(5000)).unwrap_err().to_string().contains("MiB"));
-    assert!(fine(1 << 24, None).unwrap_err().to_string().contains("--tolerance"));
+    assert!(fine(1 << 24, None).unwrap_err().to_string().contains("fits, with distances of about"));
     let stop = Watch { stop: &|| true, ..Watch::NONE };
     assert!(surface(&solids, &Fineness { tolerance: 0.1, cells: None, memory: MEMORY }, &stop).is_err());
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::common::{OutputArgs, SceneArgs, ThreadArgs, with_pool};
 use super::interrupt::stopped;
 use super::output::{json_to_stdout, to_stdout};
-use crate::convert::{Distances, Fineness, Grid, Solids, Topology, Voxels, Watch, surface, voxels};
+use crate::convert::{Distances, Fineness, Grid, Solids, Topology, Voxels, Wanted, Watch, surface, voxels};
 use crate::error::{Error, Result};
 use crate::film::mesh::{MeshKind, write_mesh};
 use crate::film::{check_apart, check_file, npy};
@@ -147,7 +147,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
                 mesh(args, kind, &found.mesh, &made, tolerance)
             }
             Some(kind) => {
-                let found = Voxels::new(&solids, spacing, &fineness, &watch)?;
+                let found = Voxels::new(&solids, spacing, Wanted::Faces, &fineness, &watch)?;
                 let grid = Grid { origin: found.origin, spacing, cells: found.size };
                 let (faces, topology) = found.mesh(&fineness)?;
                 bar.finish_and_clear();
@@ -155,7 +155,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
                 mesh(args, kind, &faces, &made, voxels::tolerance_of(spacing))
             }
             None => {
-                let found = Voxels::new(&solids, spacing, &fineness, &watch)?;
+                let found = Voxels::new(&solids, spacing, Wanted::Flags, &fineness, &watch)?;
                 bar.finish_and_clear();
                 flags(args, &found)
             }

@@ -25,6 +25,7 @@ pub mod voxels;
 pub mod watch;
 
 mod cell;
+mod hint;
 mod islands;
 mod lines;
 mod qef;
@@ -43,11 +44,12 @@ pub use check::Topology;
 pub use grid::Grid;
 pub use measure::Distances;
 pub use select::Solids;
-pub use voxels::Voxels;
+pub use voxels::{Voxels, Wanted};
 pub use watch::Watch;
 
 use crate::error::{Error, Result};
 use crate::scene::mesh::Mesh;
+use hint::{COARSE, Sampled, hinted, largest};
 use nearby::Nearby;
 use rows::Rows;
 use samples::Samples;
@@ -56,7 +58,7 @@ use weave::Net;
 /// Tolerances in a cell of the first grid.
 const CELL: f64 = 4.0;
 /// Cells along the longest side of the first grid: at least, at most.
-const FIRST: (f64, f64) = (16.0, 64.0);
+const FIRST: (f64, f64) = (16.0, COARSE);
 /// Cells of this share of the tolerance are the last: what is further away then is thinner than a cell.
 const LAST: f64 = 0.25;
 /// Where the grid's planes are between its cells' edges and the box of the solids: no simple fraction, so that flat
@@ -98,30 +100,43 @@ pub fn surface(solids: &Solids, fineness: &Fineness, watch: &Watch<'_>) -> Resul
     let first = (side / (CELL * fineness.tolerance)).clamp(FIRST.0, FIRST.1);
     let mut count = fineness.cells.map_or(first, f64::from);
     let grid_of = |count: f64| Grid::around(solids.lo, solids.hi, side / count, SHIFT);
-    // Cells along the longest side, edges crossed, distance reached: of a grid that tells what a finer one needs.
-    let mut known = None;
-    if count > FIRST.1 {
-        let coarse = Samples::new(&solids.world, grid_of(FIRST.1)?, &|_| Ok(()), watch)?;
-        known = Some((FIRST.1, coarse.meetings.len(), None));
-    }
+    let sampled = |cells: f64| -> Result<Sampled> {
+        let coarse = Samples::new(&solids.world, grid_of(cells)?, &|_| Ok(()), watch)?;
+        Ok(Sampled { cells, crossed: coarse.meetings.len() as u64 })
+    };
+    // Of a grid that tells what a finer one needs, and the distance that was reached with it.
+    let mut known: Option<(Sampled, Option<f64>)> = if count > COARSE { Some((sampled(COARSE)?, None)) } else { None };
     loop {
         let grid = grid_of(count)?;
         let least = Rows::least_bytes(&grid);
         let enough = |crossed: u64| {
-            let bytes = least + crossed * BYTES_PER_MEETING;
-            let reached = known.and_then(|(_, _, reached)| reached);
-            afford(bytes, fineness, || need(&grid, bytes, fineness, reached))
+            let [x, y, z] = grid.cells;
+            let what = || format!("a grid of {x} x {y} x {z} cells needs");
+            afford(least + crossed * BYTES_PER_MEETING, fineness, what)
         };
-        // A surface crosses four times as many edges of cells half as large.
-        enough(known.map_or(0, |(cells, crossed, _)| (crossed as f64 * (count / cells).powi(2)) as u64))?;
-        let samples = Samples::new(&solids.world, grid, &enough, watch)?;
+        let told = enough(known.map_or(0, |(sampled, _)| sampled.crossed_of(count)));
+        let samples = told.and_then(|()| Samples::new(&solids.world, grid, &enough, watch));
+        let samples = hinted(samples, || {
+            if let Some((Sampled { cells, .. }, Some(reached))) = known {
+                let cells = cells.floor();
+                return Ok(format!("--cells {cells} fits, with distances of about {reached:.2e}"));
+            }
+            let sampled = known.map_or_else(|| sampled(count.min(COARSE)), |(sampled, _)| Ok(sampled))?;
+            let bytes = |n: u64| Some(Rows::least_bytes(&grid_of(n as f64).ok()?) + sampled.bytes_of(n as f64));
+            Ok(match largest(count.ceil() as u64, fineness, bytes) {
+                0 => "no coarser one fits".into(),
+                n if n as f64 <= sampled.cells => format!("--cells {n} fits"),
+                n => format!("--cells {n} should fit"),
+            })
+        })?;
         let found = on_grid(solids, &samples, fineness, watch)?;
         let is_last = fineness.cells.is_some() || grid.spacing <= LAST * fineness.tolerance;
         if is_last || found.distances.largest() <= fineness.tolerance {
             let what = || format!("no corner of a grid with cells of {:.2e} is inside the solids", grid.spacing);
             return if found.mesh.triangles.is_empty() { Err(empty(what())) } else { Ok(found) };
         }
-        known = Some((count, samples.meetings.len(), Some(found.distances.largest())));
+        let crossed = samples.meetings.len() as u64;
+        known = Some((Sampled { cells: count, crossed }, Some(found.distances.largest())));
         count *= 2.0;
     }
 }
@@ -160,19 +175,6 @@ fn on_grid(solids: &Solids, samples: &Samples, fineness: &Fineness, watch: &Watc
 /// Nothing is left to write.
 fn empty(what: String) -> Error {
     Error::Usage(format!("{what}: they are empty, or thinner than that everywhere"))
-}
-
-/// What a grid that needs `bytes` is, and what would fit.
-fn need(grid: &Grid, bytes: u64, fineness: &Fineness, reached: Option<f64>) -> String {
-    let [x, y, z] = grid.cells;
-    let longest = x.max(y).max(z) as f64;
-    let share = (bytes as f64 / fineness.memory.max(1) as f64).sqrt() * 1.1;
-    let fits = match (reached, fineness.cells) {
-        (_, Some(_)) => format!("--cells {}", (longest / share) as u64),
-        (Some(reached), None) => format!("--tolerance {:.2e}", reached * 1.01),
-        (None, None) => format!("--tolerance {:.2e}", grid.spacing * share / CELL),
-    };
-    format!("a grid of {x} x {y} x {z} cells ({fits} fits) needs")
 }
 
 /// Refuses what needs more memory than allowed; `what` says what.

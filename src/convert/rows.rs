@@ -55,6 +55,11 @@ impl Rows {
         &self.changes[self.starts[row]..self.starts[row + 1]]
     }
 
+    /// Number of all changes.
+    pub fn count(&self) -> u64 {
+        self.changes.len() as u64
+    }
+
     /// Whether a corner is inside.
     pub fn is_inside(&self, [x, y, z]: [usize; 3]) -> bool {
         self.row(y, z).partition_point(|&change| change as usize <= x) % 2 == 1

@@ -108,7 +108,7 @@ pub fn rows_of(world: &World<f64>, grid: &Grid, watch: &Watch<'_>) -> Result<Row
 }
 
 /// Number of edges along y and z whose ends differ.
-fn crossed(rows: &Rows, grid: &Grid) -> u64 {
+pub fn crossed(rows: &Rows, grid: &Grid) -> u64 {
     let [_, ny, nz] = grid.corners();
     let count = |a: &[u32], b: &[u32]| differences(a, b).iter().map(|d| u64::from(d.x.end - d.x.start)).sum::<u64>();
     let of = |z: usize| {

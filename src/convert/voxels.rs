@@ -9,8 +9,9 @@ use rayon::prelude::*;
 
 use super::check::{self, Topology};
 use super::grid::Grid;
+use super::hint::{COARSE, Sampled, hinted, largest};
 use super::rows::{Rows, differences};
-use super::samples::{Meeting, Samples, rows_of};
+use super::samples::{Meeting, Samples, crossed, rows_of};
 use super::select::Solids;
 use super::snap::snap;
 use super::vertices::in_the_middle;
@@ -22,6 +23,21 @@ use crate::scene::mesh::Mesh;
 
 /// Shares of a voxel that are rounding.
 const ROUNDING: f64 = 1e-6;
+
+/// Most voxels along the longest side that a hint names.
+const MOST: u64 = 60_000;
+
+/// Said where no hint helps.
+const NONE_FITS: &str = "no coarser ones fit";
+
+/// What is made of voxels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// Their flags: [`Voxels::planes`].
+    Flags,
+    /// Their outer faces: [`Voxels::mesh`], which needs memory for each.
+    Faces,
+}
 
 /// Flags of voxels.
 #[derive(Debug)]
@@ -38,23 +54,16 @@ pub struct Voxels {
 }
 
 impl Voxels {
-    /// Those of edge `spacing` in the box of `solids`; the box is in the middle of them.
+    /// Those of edge `spacing` in the box of `solids`; the box is in the middle of them. `wanted` is what an error's hint must fit.
     ///
     /// # Errors
     /// More voxels than the memory allowed has bytes; those of `watch`.
-    pub fn new(solids: &Solids, spacing: f64, fineness: &Fineness, watch: &Watch<'_>) -> Result<Self> {
-        // Boxes are a few roundings wider than what is in them.
-        let counts = ((solids.hi - solids.lo) / spacing - ROUNDING).ceil().max(DVec3::ONE);
-        let origin = 0.5 * (solids.lo + solids.hi) - 0.5 * spacing * (counts - 1.0);
-        let grid = Grid::new(origin - spacing, spacing, counts + 1.0)?;
+    pub fn new(solids: &Solids, spacing: f64, wanted: Wanted, fineness: &Fineness, watch: &Watch<'_>) -> Result<Self> {
+        let (origin, grid) = middles(solids, spacing)?;
         let size = grid.cells.map(|n| n - 1);
-        afford(grid.corner_count() + Rows::least_bytes(&grid), fineness, || {
-            // As many as fit a cube, whatever the box.
-            let most = (fineness.memory as f64 / 2.0).cbrt().floor();
-            let tolerance = tolerance_of((solids.hi - solids.lo).max_element() / most);
-            let [x, y, z] = size;
-            format!("{x} x {y} x {z} voxels (--voxels {most} or --tolerance {tolerance:.2e} fits) need")
-        })?;
+        let [x, y, z] = size;
+        let affordable = afford(least_bytes(&grid), fineness, || format!("{x} x {y} x {z} voxels need"));
+        hinted(affordable, || what_fits(solids, wanted, fineness, watch))?;
         let rows = rows_of(&solids.world, &grid, watch)?;
         Ok(Self { origin, spacing, size, grid, rows })
     }
@@ -84,10 +93,17 @@ impl Voxels {
     /// # Errors
     /// More faces than the memory allowed holds; voxels below the digits of `f32`.
     pub fn mesh(self, fineness: &Fineness) -> Result<(Mesh, Topology)> {
-        let meetings = faces(&self.grid, &self.rows);
-        afford(meetings.len() as u64 * BYTES_PER_MEETING, fineness, || {
-            format!("{} faces of voxels need", meetings.len())
+        let crossed = self.rows.count() + crossed(&self.rows, &self.grid);
+        let affordable = afford(crossed * BYTES_PER_MEETING, fineness, || format!("{crossed} faces of voxels need"));
+        hinted(affordable, || {
+            let count = self.size.into_iter().max().unwrap_or(0);
+            let known = Sampled { cells: count as f64, crossed };
+            Ok(match largest(count as u64, fineness, |n| Some(known.bytes_of(n as f64))) {
+                0 => NONE_FITS.into(),
+                most => format!("--voxels {most} should fit"),
+            })
         })?;
+        let meetings = faces(&self.grid, &self.rows);
         if meetings.is_empty() {
             return Err(empty(format!("no voxel of {:.2e} has its middle inside the solids", self.spacing)));
         }
@@ -99,6 +115,43 @@ impl Voxels {
         let topology = check::check(&mesh).map_err(|what| Error::Mismatch(format!("the voxels' mesh: {what}")))?;
         Ok((mesh, topology))
     }
+}
+
+/// The middle of the first voxel, and the grid of all middles with a layer around them.
+fn middles(solids: &Solids, spacing: f64) -> Result<(DVec3, Grid)> {
+    // Boxes are a few roundings wider than what is in them.
+    let counts = ((solids.hi - solids.lo) / spacing - ROUNDING).ceil().max(DVec3::ONE);
+    let origin = 0.5 * (solids.lo + solids.hi) - 0.5 * spacing * (counts - 1.0);
+    Ok((origin, Grid::new(origin - spacing, spacing, counts + 1.0)?))
+}
+
+/// Bytes of voxels before anything is known of the surface.
+fn least_bytes(grid: &Grid) -> u64 {
+    grid.corner_count() + Rows::least_bytes(grid)
+}
+
+/// What would fit instead of voxels that do not; faces are counted on a coarse grid.
+fn what_fits(solids: &Solids, wanted: Wanted, fineness: &Fineness, watch: &Watch<'_>) -> Result<String> {
+    let side = (solids.hi - solids.lo).max_element();
+    let mut known = Sampled { cells: COARSE, crossed: 0 };
+    if wanted == Wanted::Faces {
+        let (_, grid) = middles(solids, side / COARSE)?;
+        let rows = rows_of(&solids.world, &grid, watch)?;
+        known.crossed = rows.count() + crossed(&rows, &grid);
+    }
+    let most = largest(MOST, fineness, |n| {
+        let (_, grid) = middles(solids, side / n as f64).ok()?;
+        Some(least_bytes(&grid).max(known.bytes_of(n as f64)))
+    });
+    // A half per cent more than exact, as digits are left out.
+    let tolerance = 1.006 * tolerance_of(side / most as f64);
+    Ok(match wanted {
+        _ if most == 0 => NONE_FITS.into(),
+        Wanted::Flags => format!("--voxels {most} or --tolerance {tolerance:.2e} fits"),
+        // A tolerance would ask for another kind of mesh.
+        Wanted::Faces if most as f64 <= COARSE => format!("--voxels {most} fits"),
+        Wanted::Faces => format!("--voxels {most} should fit"),
+    })
 }
 
 /// Edge of voxels whose corners are `tolerance` away from their middles.
