@@ -86,7 +86,7 @@ fn a_stopped_render_goes_on_with_the_same_bits() {
     assert!(!first.is_complete() && (9..TILES).contains(&first.tiles_done) && done == first.tiles_done, "{done}");
     // Once more, and then to the end.
     let (second, seen) = scene.render(Some((&path, "a")), 15).expect("a part");
-    assert!(second.tiles_done >= 15 && seen == second.tiles_done && second.seconds >= first.seconds);
+    assert!(second.tiles_done >= 15 && seen == second.tiles_done, "{seen}");
     let (third, seen) = scene.render(Some((&path, "a")), u64::MAX).expect("a picture");
     assert_same(&third, &whole, "in three parts");
     assert_eq!(seen, TILES, "those of before count as done");
