@@ -33,8 +33,8 @@ pub const BATCH: usize = 16;
 /// Spanned volume (of a scene of unit size) from which on products of coordinates keep their digits.
 const LEAST_VOLUME: f32 = 1e-30;
 
-/// The same volume as a part of the products it is the sum of: well above what f64 rounds them to, in which weights are told. Not more,
-/// as blocks on a grid have many sides that are seen from their own plane but for the rounding of f32, which moves them like corners.
+/// The same volume as a part of the lengths it is the product of: well above what f64 rounds to, in which weights are told. Not more, as
+/// blocks on a grid have many sides that are seen from their own plane but for the rounding of f32, which moves them like corners.
 const LEAST_PART: f32 = 1e-9;
 
 /// Edge functions that change sign within the tile may be wrong by what moves an edge this far, in half ulps of the
@@ -291,8 +291,8 @@ impl Batch {
 
         let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
         // Seen from its own plane, or from its corner, a triangle has no depth that its corners would not belie.
-        let products = dot(map3(normal, V::abs), map3(p[0], V::abs));
         let [a, b, c] = map3(*p, sum);
+        let products = sum(normal) * a;
         let away = (a.fast_max(b).fast_max(c) * V::splat(LEAST_DISTANCE)).cmp_lt(a.fast_min(b).fast_min(c));
         let tells = V::splat(LEAST_VOLUME).cmp_le(size) & (products * V::splat(LEAST_PART)).cmp_lt(size) & away;
         planes.wild = in_front & !tells.bits();

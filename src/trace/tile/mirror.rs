@@ -26,7 +26,7 @@ const CLOSE: [f32; 2] = [4.0, 1.5];
 
 /// Distances of the point count up to this many times the scene's largest coordinate: what directions round to grows with the
 /// distance, the bound that answers keep does not.
-const FAR: f32 = 8.0;
+const FAR: f32 = 2.0;
 
 /// The same for the first guess, which is made from one group.
 const FIRST: [f32; 2] = [512.0; 2];
