@@ -104,6 +104,9 @@ pub struct Planes {
     pub rcp: [f32; BATCH],
     /// Own answers: triangles too small for this arithmetic or seen edge-on, bit by triangle.
     pub wild: u32,
+    /// Own answers: triangles whose plane passes the apex within rounding, so that it tells no depth: where a ray meets such a one
+    /// is where its weights say.
+    pub edge_on: u32,
     /// Own answers: triangles whose weights need more digits, bit by triangle.
     pub unsteady: u32,
     /// Own answers, rays with a common point behind them: triangles whose `rcp` is not certain, bit by triangle.
@@ -292,15 +295,19 @@ impl Batch {
         let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
         // Seen from its own plane, or from its corner, a triangle has no depth that its corners would not belie.
         let [a, b, c] = map3(*p, sum);
-        let products = sum(normal) * a;
+        let lengths = sum(normal) * a;
         let away = (a.fast_max(b).fast_max(c) * V::splat(LEAST_DISTANCE)).cmp_lt(a.fast_min(b).fast_min(c));
-        let tells = V::splat(LEAST_VOLUME).cmp_le(size) & (products * V::splat(LEAST_PART)).cmp_lt(size) & away;
+        let tells = V::splat(LEAST_VOLUME).cmp_le(size) & (lengths * V::splat(LEAST_PART)).cmp_lt(size) & away;
         planes.wild = in_front & !tells.bits();
+        let edge_on = size.cmp_le(lengths * V::splat(LEAST_DISTANCE));
+        planes.edge_on = in_front & edge_on.bits() & !planes.wild;
         // Weights are for the nearest hit only.
-        planes.unsteady = if ANY { 0 } else { in_front & !steady(groups, p, (&edges, &eps), high).bits() };
+        let steady = if ANY { u32::MAX } else { steady(groups, p, (&edges, &eps), high).bits() & !planes.edge_on };
+        planes.unsteady = in_front & !steady;
         let eps = eps[0].fast_max(eps[1]).fast_max(eps[2]);
         (-eps).store(&mut planes.outside);
-        eps.store(&mut planes.inside);
+        let inside = if ANY { eps } else { select(edge_on, V::splat(f32::INFINITY), eps) };
+        inside.store(&mut planes.inside);
         planes.corners = map3(*p, |q| map3(q, V::to_array));
         let own = |inverse: V| nearest.fast_min(farthest.fast_max(inverse));
         let [e0, e1, e2] = edges;

@@ -82,6 +82,9 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
 ) -> bool {
     let (plane, line) = (Plane::of(planes, i), Line::of(groups, g));
     let (inverse, best, edges) = (plane.depth(&line), line.best, plane.edges(&line));
+    if !ANY && planes.edge_on >> i & 1 != 0 {
+        return pair_edge_on::<MANY>(groups, planes, g, i, id, edges.possible.bits());
+    }
     let mut maybe = edges.possible;
     if groups.ends_early {
         maybe = maybe & inverse.cmp_le(groups.of[g].inv_hi);
@@ -112,6 +115,31 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
     id.name::<MANY>(groups, g, hit);
     let weights = [0, 1].map(|k| select(keeps, edges.weights[k], weights[k] * inverse));
     keep(groups, g, hit, inverse, weights);
+    hit.any()
+}
+
+/// [`pair_doubtful`] for a triangle that is seen edge-on: its depth is that of the place its weights say.
+#[cold]
+#[inline(never)]
+fn pair_edge_on<const MANY: bool>(
+    groups: &mut Groups,
+    planes: &Planes,
+    g: usize,
+    i: usize,
+    id: Id,
+    possible: u32,
+) -> bool {
+    let (inside, weights) = exact_weights(groups, planes, g, i, possible);
+    let [z, one, other] = planes.corners.map(|p| p[2][i]);
+    let [one, other] = [one - z, other - z].map(V::splat);
+    let inverse = V::constant(1.0) / weights[0].mul_add(one, weights[1].mul_add(other, V::splat(z)));
+    let best = groups.of[g].inv_lo;
+    let mut hit = inside & best.cmp_le(inverse) & (best.cmp_lt(inverse) | id.is_not_after::<MANY>(groups, g));
+    if groups.ends_early {
+        hit = hit & inverse.cmp_le(groups.of[g].inv_hi);
+    }
+    id.name::<MANY>(groups, g, hit);
+    keep(groups, g, hit, inverse, weights.map(|weight| weight * inverse));
     hit.any()
 }
 
