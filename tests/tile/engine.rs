@@ -442,16 +442,26 @@ fn eyes_at_floor_height() {
         }
     }
     let world = compile(vec![floor]);
-    let mut r = Random(41);
-    for case in 0..24 {
-        let eye = [r.unit() * 2.0 - 1.0, 0.0, [3.0, 1.0, 0.3][case % 3]].map(|x| x as f32);
-        let mut rays = Rays::new(2048);
-        for i in 0..rays.len() {
-            let off = [0.0, 1e-17, -1e-12, 1e-8, -1e-6, 0.2][r.bits() as usize % 6];
-            let dir = [r.unit() * 2.0 - 1.0, off, -1.0].map(|x| x as f32);
-            rays.set(i, eye, dir, 0.0, f32::INFINITY);
+    for offs in [&[0.0][..], &[0.0, 1e-17], &[1e-12, -1e-12], &[0.2, -0.2, 0.0], &[1e-8, -1e-8]] {
+        let mut r = Random(41);
+        for case in 0..12 {
+            let eye = [r.unit() * 2.0 - 1.0, 0.0, [3.0, 1.0, 0.3][case % 3]].map(|x| x as f32);
+            let mut rays = Rays::new(2048);
+            for i in 0..rays.len() {
+                let dir = [r.unit() * 2.0 - 1.0, offs[i % offs.len()], -1.0].map(|x| x as f32);
+                rays.set(i, eye, dir, 0.0, f32::INFINITY);
+            }
+            assert_eq!(differences(&world, &rays), (0, 0), "{offs:?} case {case}");
         }
-        assert_eq!(differences(&world, &rays), (0, 0), "case {case}");
+    }
+    // As cameras of an odd height see it: the middle row lies in the plane.
+    for eye in [[0.3, 0.0, 3.0], [-0.7, 0.0, 2.0], [0.3, 0.0, 0.31], [0.0, 0.0, 1.7]] {
+        let mut rays = Rays::new(1024);
+        for i in 0..rays.len() {
+            let at = |k: usize| (k as f32 - 15.0) / 40.0;
+            rays.set(i, eye, [at(i % 32), at(i / 32), -1.0], 0.0, f32::INFINITY);
+        }
+        assert_eq!(differences(&world, &rays), (0, 0), "{eye:?}");
     }
 }
 

@@ -299,15 +299,16 @@ impl Batch {
         let away = (a.fast_max(b).fast_max(c) * V::splat(LEAST_DISTANCE)).cmp_lt(a.fast_min(b).fast_min(c));
         let tells = V::splat(LEAST_VOLUME).cmp_le(size) & (lengths * V::splat(LEAST_PART)).cmp_lt(size) & away;
         planes.wild = in_front & !tells.bits();
-        let edge_on = size.cmp_le(lengths * V::splat(LEAST_DISTANCE));
+        // Where segments start behind something, those that are flat are left to the common formula instead.
+        let apart = if ANY || groups.is_behind { V::splat(-1.0) } else { lengths * V::splat(LEAST_DISTANCE) };
+        let edge_on = size.cmp_le(apart);
         planes.edge_on = in_front & edge_on.bits() & !planes.wild;
         // Weights are for the nearest hit only.
         let steady = if ANY { u32::MAX } else { steady(groups, p, (&edges, &eps), high).bits() & !planes.edge_on };
         planes.unsteady = in_front & !steady;
         let eps = eps[0].fast_max(eps[1]).fast_max(eps[2]);
         (-eps).store(&mut planes.outside);
-        let inside = if ANY { eps } else { select(edge_on, V::splat(f32::INFINITY), eps) };
-        inside.store(&mut planes.inside);
+        select(edge_on, V::splat(f32::INFINITY), eps).store(&mut planes.inside);
         planes.corners = map3(*p, |q| map3(q, V::to_array));
         let own = |inverse: V| nearest.fast_min(farthest.fast_max(inverse));
         let [e0, e1, e2] = edges;
