@@ -47,6 +47,9 @@ const LEAST_SUM: f32 = 8.0;
 /// A distance between the apex and a plane is certain beyond this part of the products it is made of.
 const LEAST_DISTANCE: f32 = 32.0 * HALF_ULP;
 
+/// A triangle that is seen edge-on tells no depth near a corner that is closer than this part of its farthest one.
+const NEAR_CORNER: f32 = 1e-3;
+
 /// A depth interval wider than this says nothing.
 const WILD: f32 = 0.25;
 
@@ -295,13 +298,15 @@ impl Batch {
         let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
         // Seen from its own plane, or from its corner, a triangle has no depth that its corners would not belie.
         let [a, b, c] = map3(*p, sum);
-        let lengths = sum(normal) * a;
-        let away = (a.fast_max(b).fast_max(c) * V::splat(LEAST_DISTANCE)).cmp_lt(a.fast_min(b).fast_min(c));
-        let tells = V::splat(LEAST_VOLUME).cmp_le(size) & (lengths * V::splat(LEAST_PART)).cmp_lt(size) & away;
-        planes.wild = in_front & !tells.bits();
+        let (lengths, closest) = (sum(normal) * a, a.fast_min(b).fast_min(c));
+        let farthest_corner = a.fast_max(b).fast_max(c);
+        let away = |part: f32| (farthest_corner * V::splat(part)).cmp_lt(closest);
         // Where segments start behind something, those that are flat are left to the common formula instead.
         let apart = if ANY || groups.is_behind { V::splat(-1.0) } else { lengths * V::splat(LEAST_DISTANCE) };
         let edge_on = size.cmp_le(apart);
+        let tells = V::splat(LEAST_VOLUME).cmp_le(size) & (lengths * V::splat(LEAST_PART)).cmp_lt(size);
+        let tells = tells & away(LEAST_DISTANCE) & (!edge_on | away(NEAR_CORNER));
+        planes.wild = in_front & !tells.bits();
         planes.edge_on = in_front & edge_on.bits() & !planes.wild;
         // Weights are for the nearest hit only.
         let steady = if ANY { u32::MAX } else { steady(groups, p, (&edges, &eps), high).bits() & !planes.edge_on };

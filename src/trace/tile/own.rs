@@ -132,7 +132,8 @@ fn pair_edge_on<const MANY: bool>(
     let (inside, weights) = exact_weights(groups, planes, g, i, possible);
     let [z, one, other] = planes.corners.map(|p| p[2][i]);
     let [one, other] = [one - z, other - z].map(V::splat);
-    let inverse = V::constant(1.0) / weights[0].mul_add(one, weights[1].mul_add(other, V::splat(z)));
+    let depth = weights[0].mul_add(one, weights[1].mul_add(other, V::splat(z)));
+    let inverse = (V::constant(1.0) / depth).fast_min(V::splat(f32::MAX));
     let best = groups.of[g].inv_lo;
     let mut hit = inside & best.cmp_le(inverse) & (best.cmp_lt(inverse) | id.is_not_after::<MANY>(groups, g));
     if groups.ends_early {
