@@ -132,6 +132,38 @@ fn inputs_are_not_written_over() {
     }
 }
 
+/// Nor are the files that a scene refers to.
+#[test]
+fn files_of_a_scene_are_not_written_over() {
+    let dir = folder();
+    let corners = ["0 0 0", "0 1 0", "1 0 0", "0 0 1"];
+    let facets = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]].map(|facet| {
+        let loops = facet.map(|k| format!("vertex {}\n", corners[k])).concat();
+        format!("facet normal 0 0 0\nouter loop\n{loops}endloop\nendfacet\n")
+    });
+    let stl = format!("solid s\n{}endsolid s\n", facets.concat());
+    std::fs::write(dir.path().join("part.stl"), &stl).expect("a mesh");
+    std::fs::write(dir.path().join("part.kdl"), "mesh \"part.stl\"\n").expect("a scene");
+    let ended = lanecast(dir.path(), &["render", "part.kdl", "-o", "wood.png", "--size", "8x8"]);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+    let wood = std::fs::read(dir.path().join("wood.png")).expect("a picture");
+    let looks = "material \"wood\" { texture \"wood.png\" }\nbox material=\"wood\"\n";
+    std::fs::write(dir.path().join("looks.kdl"), looks).expect("a scene");
+    let before = binary::files(dir.path());
+    for (line, what) in [
+        ("convert part.kdl -o part.stl", "part.stl: expected another file to write to; this one is read"),
+        ("render looks.kdl -o wood.png --size 8x8", "wood.png: expected another file to write to; this one is read"),
+    ] {
+        refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);
+    }
+    assert_eq!(binary::files(dir.path()), before);
+    assert_eq!(std::fs::read(dir.path().join("part.stl")).expect("the mesh"), stl.as_bytes());
+    assert_eq!(std::fs::read(dir.path().join("wood.png")).expect("the picture"), wood);
+    // Beside them there is room.
+    let ended = lanecast(dir.path(), &["render", "looks.kdl", "-o", "other.png", "--size", "8x8"]);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+}
+
 /// Whatever says what is measured has no meaning where nothing is, or where a file says it.
 #[test]
 fn options_without_effect_are_refused() {

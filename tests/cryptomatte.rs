@@ -95,7 +95,7 @@ fn ranks(film: &Film, layer: &str) -> Vec<Vec<(u32, f64)>> {
 
 fn picture(integrator: Integrator, threads: usize) -> Film {
     let read = |path: &Path| Err(Error::whole(path, "no meshes here"));
-    let files = MeshFiles { folder: None, allow_outside: false, read: &read };
+    let files = MeshFiles { folder: None, allow_outside: false, found: None, read: &read };
     let d = parse(Path::new("t.kdl"), "t", SCENE.as_bytes(), &[], &files).unwrap();
     let world = World::<f32>::compile(&d, Preset::Balanced).unwrap();
     let camera = Camera::new(&d.cameras[0], 1.5).unwrap();

@@ -62,7 +62,7 @@ fn stl_corpus() {
 
 #[test]
 fn gltf_corpus() {
-    const NO_FILES: References = References { folder: None, allow_outside: false };
+    const NO_FILES: References = References { folder: None, allow_outside: false, found: None };
     replay("gltf", |file, bytes| gltf::parse(file, "corpus", bytes, &NO_FILES).map(|scene| scene.meshes));
 }
 

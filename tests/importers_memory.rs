@@ -30,7 +30,7 @@ fn measure(file: &Path) {
         Some("mtl") => mtl::parse(file, &bytes).map(drop),
         Some("ply") => ply::parse(file, &bytes).map(drop),
         Some("gltf" | "glb") => {
-            let references = References { folder: None, allow_outside: false };
+            let references = References { folder: None, allow_outside: false, found: None };
             gltf::parse(file, "memory", &bytes, &references).map(drop)
         }
         _ => stl::parse(file, &bytes).map(drop),

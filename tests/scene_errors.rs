@@ -10,7 +10,7 @@ use lanecast::scene::load::{LoadOptions, load};
 
 fn scene(text: &[u8]) -> Result<Description> {
     let read = |path: &Path| Err(Error::whole(path, "no files here"));
-    let files = MeshFiles { folder: None, allow_outside: false, read: &read };
+    let files = MeshFiles { folder: None, allow_outside: false, found: None, read: &read };
     parse(Path::new("t.kdl"), "t", text, &[], &files)
 }
 

@@ -179,7 +179,7 @@ fn the_examples_of_the_reference_are_scenes() {
     }
     let file = || MeshFile { mesh: Mesh::default(), digest: [0; 32], looks: Looks::default() };
     let read = |_: &Path| Ok(file());
-    let files = MeshFiles { folder: Some(folder.path()), allow_outside: false, read: &read };
+    let files = MeshFiles { folder: Some(folder.path()), allow_outside: false, found: None, read: &read };
     for example in examples {
         let scene = parse(Path::new("docs/SCENES.md"), "example", example.as_bytes(), &[], &files);
         assert!(scene.is_ok(), "{example}\n{}", scene.unwrap_err());

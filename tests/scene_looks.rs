@@ -11,7 +11,7 @@ use lanecast::scene::texture::Texels;
 
 fn read_in(folder: Option<&Path>, text: &str) -> Result<Description> {
     let read = |path: &Path| Err(Error::whole(path, "no meshes here"));
-    let files = MeshFiles { folder, allow_outside: false, read: &read };
+    let files = MeshFiles { folder, allow_outside: false, found: None, read: &read };
     parse(Path::new("t.kdl"), "t", text.as_bytes(), &[], &files)
 }
 

@@ -9,7 +9,7 @@ use lanecast::scene::reference::References;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    let references = References { folder: None, allow_outside: false };
+    let references = References { folder: None, allow_outside: false, found: None };
     if let Ok(scene) = gltf::parse(Path::new("fuzz.gltf"), "fuzz", bytes, &references) {
         for mesh in &scene.meshes {
             assert!(mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.positions.len()));

@@ -2,9 +2,10 @@
 
 mod frames;
 mod kept;
+mod plain;
 mod report;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::ProgressBar;
@@ -17,7 +18,7 @@ use super::preview::{Job, PreviewArgs};
 use crate::camera::Filter;
 use crate::error::{Error, Result};
 use crate::film::exr::ImageInfo;
-use crate::film::{Window, check_file};
+use crate::film::{Window, check_apart, check_file};
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
 use crate::render::{Aov, Progress, RenderOptions};
@@ -163,39 +164,16 @@ impl RenderArgs {
         self.files.iter().flat_map(|file| files(file, &planes)).try_for_each(|file| check_file(&file))
     }
 
+    /// Checks that they replace none of the files that the scene refers to.
+    fn check_apart(&self, description: &Description, options: &RenderOptions) -> Result<()> {
+        let planes = options.planes();
+        let inputs: Vec<&Path> = description.files.iter().map(PathBuf::as_path).collect();
+        self.files.iter().flat_map(|file| files(file, &planes)).try_for_each(|file| check_apart(&file, &inputs))
+    }
+
     /// Whether all that is wanted of the picture are the levels of `.pix` files.
     fn holds_levels(&self) -> bool {
         !self.preview.by_blocks() && self.files.iter().all(|file| file.format == Format::Pix)
-    }
-
-    /// The arguments of a plain EXR picture of a scene: what a bench leaves beside its rows.
-    pub(super) fn plain(scene: SceneArgs, camera: CameraArgs, threads: ThreadArgs, path: PathBuf) -> Self {
-        Self {
-            scene,
-            files: vec![Target { path, format: Format::Exr }],
-            camera,
-            crop: None,
-            integrator: None,
-            rt_compat: false,
-            spp: Some(1),
-            time_limit: None,
-            noise: None,
-            filter: Filter::Box,
-            seed: 0,
-            depth: None,
-            stats: false,
-            ao_samples: 16,
-            ao_radius: 0.2,
-            aov: "all".into(),
-            exposure: 0.0,
-            engine: EngineArgs::default(),
-            tile: 32,
-            frames: None,
-            resume: false,
-            preview: PreviewArgs::default(),
-            threads,
-            output: OutputArgs::default(),
-        }
     }
 }
 
@@ -222,6 +200,7 @@ pub(super) fn of_scene(args: &RenderArgs, description: &Description) -> Result<(
 }
 
 fn still(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
+    args.check_apart(description, options)?;
     if options.integrator == Integrator::Rt {
         check_rt(description, args.scene.options.lenient, &args.output)?;
     }

@@ -3,7 +3,7 @@
 
 use super::events::settled;
 use super::leaf::Leaf;
-use super::solid::{Solid, tolerance, widened};
+use super::solid::{ROUNDINGS, Solid, tolerance, widened};
 use crate::lanes::{Lanes, Real};
 use crate::math::Aabb;
 use crate::ray::Packet;
@@ -57,7 +57,7 @@ impl<S: Real> Sole<S> {
         interval: &Interval<V>,
     ) -> Option<Span<V>> {
         let span = self.leaf.span(packet, &solid.stores)?;
-        let eps = tolerance(packet, self.size, self.least);
+        let eps = tolerance(packet, self.size, self.least, ROUNDINGS);
         let span = settled(&span, lanes, &widened(interval, eps));
         Some(Span { hit: span.hit & (span.t_in + eps).cmp_lt(span.t_out), ..span })
     }

@@ -15,7 +15,9 @@ use crate::ray::slab::Interval;
 use crate::shape::Span;
 
 /// Boundaries closer than this many roundings of the coordinates are one: 16 half ulps.
-const ROUNDINGS: f64 = 16.0;
+pub(super) const ROUNDINGS: f64 = 16.0;
+/// What two leaves make of one place differs by so many: what an answer may be off by, too.
+const OF_ONE_PLACE: f64 = 4.0;
 /// Layers of leaves, were they spread evenly, in the first part of a line (tried: 0.5 to 3).
 const LAYERS: f64 = 2.0;
 /// More bounded leaves than this are searched by a tree.
@@ -123,7 +125,15 @@ impl<S: Real> Solid<S> {
     /// Difference of t below which two boundaries of a lane are one. It depends on the lane's line only.
     #[inline(always)]
     pub fn tolerance<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>) -> V {
-        tolerance(packet, self.size, self.least)
+        tolerance(packet, self.size, self.least, ROUNDINGS)
+    }
+
+    /// Difference of t below which rounding does not tell which of two leaves' surfaces comes first. Far less than the tolerance if
+    /// they are small parts of a large solid.
+    pub(super) fn untold<V: Lanes<Scalar = S>>(&self, packet: &Packet<V>, leaves: [u32; 2]) -> V {
+        let sizes = leaves.map(|leaf| largest_coordinate(&self.leaves[leaf as usize].clip));
+        let size = sizes[0].fast_max(sizes[1]);
+        tolerance(packet, if size.is_finite() { size } else { self.size }, self.least, OF_ONE_PLACE)
     }
 
     /// Share of a line's way through the solid that is looked at first: a few layers of leaves, were they spread evenly.
@@ -286,16 +296,22 @@ impl<S: Real> Solid<S> {
     }
 }
 
-/// Difference of t below which two boundaries of a lane are one, for a solid of this `size` and `least` distance.
+/// Difference of t below which two boundaries of a lane are one, for a solid of this `size` and `least` distance: `roundings` of the
+/// coordinates.
 #[inline(always)]
-pub(super) fn tolerance<V: Lanes>(packet: &Packet<V>, size: V::Scalar, least: V::Scalar) -> V {
+pub(super) fn tolerance<V: Lanes>(packet: &Packet<V>, size: V::Scalar, least: V::Scalar, roundings: f64) -> V {
     let largest = |v: [V; 3]| v[0].abs().fast_max(v[1].abs()).fast_max(v[2].abs());
     let reach = largest(packet.org) + V::splat(size);
-    let distance = (reach * V::constant(ROUNDINGS * V::Scalar::EPSILON.to_f64())).fast_max(V::splat(least));
+    let distance = (reach * V::constant(roundings * V::Scalar::EPSILON.to_f64())).fast_max(V::splat(least));
     // One over the largest component of the direction.
     let [x, y, z] = packet.rcp.map(V::abs);
     // Infinite, nothing would be told apart, and an end at minus infinity would come to no number.
     (distance * x.fast_min(y).fast_min(z)).fast_min(V::splat(V::Scalar::MAX))
+}
+
+/// Of those of a box.
+pub(super) fn largest_coordinate<S: Real>(bounds: &Aabb<S>) -> S {
+    bounds.lo.iter().chain(&bounds.hi).fold(S::ZERO, |most, x| most.fast_max(x.abs()))
 }
 
 /// Where boundaries of a leaf may lie whose box is met in `interval`.

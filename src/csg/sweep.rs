@@ -159,7 +159,7 @@ fn sole<V: Lanes>(
     }
     if count != 2 {
         pruner.prune(&solid.tree, met, program);
-        let steps = walk(scratch, lanes, limit, eps, found);
+        let steps = walk((solid, packet), scratch, lanes, (limit, eps), found);
         return Effort { met: 1, kept: 1, events: count, steps };
     }
     let (t_in, t_out) = (events.time::<V>(0), events.time::<V>(1));
@@ -210,7 +210,7 @@ fn pass<V: Lanes>(
     }
     effort.events = events.count;
     if !met.is_empty() {
-        effort.steps = walk(scratch, pending & lanes, limit, eps, found);
+        effort.steps = walk((solid, packet), scratch, pending & lanes, (limit, eps), found);
     }
     effort
 }
@@ -218,10 +218,10 @@ fn pass<V: Lanes>(
 /// Takes the events in their order, up to `limit`; how many steps that took.
 #[inline(always)]
 fn walk<V: Lanes>(
+    (solid, packet): (&Solid<V::Scalar>, &Packet<V>),
     scratch: &mut Scratch<V::Scalar>,
     mut pending: u32,
-    limit: V,
-    eps: V,
+    (limit, eps): (V, V),
     mut found: impl FnMut(&Boundary<V>) -> u32,
 ) -> usize {
     let Scratch { search, program, events, inside, toggled, .. } = scratch;
@@ -267,7 +267,8 @@ fn walk<V: Lanes>(
             while rest != 0 {
                 let lane = rest & rest.wrapping_neg();
                 rest &= !lane;
-                if let Some(boundary) = several::<V>(met, inside, events, toggled, program, now, lane) {
+                if let Some(boundary) = several::<V>((solid, packet), met, inside, events, toggled, program, now, lane)
+                {
                     pending &= !found(&boundary);
                 }
             }
@@ -325,11 +326,12 @@ fn boundary<V: Lanes>(
     }
 }
 
-/// The boundary of one lane in which several events toggled at once: of the leaves whose own surface bounds the
-/// solid there, before or after, the first one.
+/// The boundary of one lane in which several events toggled at once: at the one where the solid begins or ends, were they taken
+/// one by one, or at the one of the first of the leaves whose own surface bounds the solid there as well as rounding tells.
 #[cold]
 #[inline(never)]
 fn several<V: Lanes>(
+    (solid, packet): (&Solid<V::Scalar>, &Packet<V>),
     met: &[Met],
     inside: &mut [u32],
     events: &Events<V::Scalar>,
@@ -338,35 +340,55 @@ fn several<V: Lanes>(
     now: u32,
     lane: u32,
 ) -> Option<Boundary<V>> {
-    let own = || toggled.iter().filter(|t| t.lanes & lane != 0);
-    let slot = |t: &Toggled| events.leaf[t.event as usize] as usize;
-    // A leaf that was entered and left again did not change.
-    let odd = |s: usize| own().filter(|t| slot(t) == s).count() % 2 == 1;
-    let flip_all = |inside: &mut [u32]| own().for_each(|t| inside[slot(t)] ^= lane);
-    let candidates: Vec<(u32, usize)> = own().filter(|t| odd(slot(t))).map(|t| (t.event, slot(t))).collect();
+    let of_lane = |numbers: &[V::Scalar]| numbers[lane.trailing_zeros() as usize].to_f64();
+    let slot = |event: u32| events.leaf[event as usize] as usize;
+    let leaf = |event: u32| met[slot(event)].leaf;
+    let at = |event: u32| of_lane(&events.t[event as usize * MAX_LANES..]);
+    let mut own: Vec<u32> = toggled.iter().filter(|t| t.lanes & lane != 0).map(|t| t.event).collect();
+    // By leaf number where t is equal: `met` is in the order of a search, which packets of another width may do otherwise.
+    own.sort_by(|&a, &b| at(a).total_cmp(&at(b)).then(leaf(a).cmp(&leaf(b))));
+    let flip_all = |inside: &mut [u32]| own.iter().for_each(|&event| inside[slot(event)] ^= lane);
+    flip_all(inside);
+    // What thin gaps and thin skins there are between is filled: first way in, last way out.
+    let mut state = !now & lane;
+    let mut crossing = None;
+    for &event in &own {
+        inside[slot(event)] ^= lane;
+        let value = program.run(inside) & lane;
+        if value != state && (crossing.is_none() || now & lane == 0) {
+            crossing = Some((event, value ^ (inside[slot(event)] & lane)));
+        }
+        state = value;
+    }
+    let (crossing, turned) = crossing?;
     let bounds = |inside: &mut [u32], program: &mut Program, s: usize, value: u32| {
         inside[s] ^= lane;
         let other = program.run(inside);
         inside[s] ^= lane;
         (other ^ value) & lane != 0
     };
-    // The smallest leaf number: `met` is in the order of a search, which packets of another width may do otherwise.
-    let mut best: Option<(bool, u32, u32)> = None;
-    for &(event, s) in &candidates {
-        let mut seen = bounds(inside, program, s, now);
+    let near = |event: u32| {
+        let mut untold = [V::Scalar::ZERO; MAX_LANES];
+        solid.untold(packet, [leaf(event), leaf(crossing)]).store(&mut untold);
+        (at(event) - at(crossing)).abs() <= of_lane(&untold)
+    };
+    // A leaf that was entered and left again did not change.
+    let is_even = |event: u32| own.iter().filter(|&&o| slot(o) == slot(event)).count() % 2 == 0;
+    let mut best = crossing;
+    for &event in own.iter().filter(|&&event| near(event) && !is_even(event)) {
+        if (false, leaf(event)) >= (is_even(best), leaf(best)) {
+            continue;
+        }
+        let mut seen = bounds(inside, program, slot(event), now);
         if !seen {
             flip_all(inside);
-            seen = bounds(inside, program, s, !now);
+            seen = bounds(inside, program, slot(event), !now);
             flip_all(inside);
         }
-        let key = (!seen, met[s].leaf, event);
-        best = Some(best.map_or(key, |b| b.min(key)));
+        if seen {
+            best = event;
+        }
     }
-    let (_, leaf, _) = best?;
-    // Of its events the nearest one.
-    let (event, _) = candidates.iter().filter(|(_, s)| met[*s].leaf == leaf).min_by(|(a, _), (b, _)| {
-        let at = |e: u32| events.t[e as usize * MAX_LANES + lane.trailing_zeros() as usize].to_f64();
-        at(*a).total_cmp(&at(*b))
-    })?;
-    Some(boundary(met, inside, events, *event, lane, now))
+    let boundary = boundary(met, inside, events, best, lane, now);
+    Some(if best == crossing { Boundary { turned, ..boundary } } else { boundary })
 }

@@ -31,6 +31,8 @@ pub struct Description {
     pub name: String,
     /// The file it came from; `None` for built-in scenes.
     pub source: Option<PathBuf>,
+    /// Files that it refers to, by their real names.
+    pub files: Vec<PathBuf>,
     /// SHA-256 over everything that determines the scene (file bytes, referenced files, `--set` values), hex.
     pub hash: String,
     /// Groups; index 0 is the root. A group may be instanced by items of other groups; there are no cycles.
@@ -172,6 +174,7 @@ impl Description {
         Self {
             name: name.into(),
             source: None,
+            files: Vec::new(),
             hash: String::new(),
             groups: vec![Group::default()],
             meshes: Vec::new(),

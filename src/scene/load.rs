@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use super::description::{Description, Item, ItemKind};
 use super::kdl::meshes::{MeshFile, MeshFiles, add_looks, add_mesh_materials};
 use super::obj::looks::Looks;
-use super::reference::References;
+use super::reference::{Found, References};
 use super::unpack::UnpackLimit;
 use super::{brlcad, builtin, gltf, kdl, obj, ply, stl, unpack};
 use crate::error::{Error, Result, nearest_name};
@@ -60,30 +60,36 @@ pub fn load_with(scene: &str, options: &LoadOptions, read: &ReadMesh<'_>) -> Res
         return builtin::load(name, &options.set);
     }
     let path = Path::new(scene);
+    let found = Found::default();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let references = References { folder: Some(folder), allow_outside: options.allow_outside, found: Some(&found) };
     let mut description = match kind.as_str() {
-        "kdl" => scene_file(path, options, read)?,
-        "gltf" | "glb" => gltf_scene(path, options)?,
+        "kdl" => scene_file(path, options, &references, read)?,
+        "gltf" | "glb" => gltf_scene(path, options, &references)?,
         "asc" | "g" => database(path, options)?,
-        _ => mesh_scene(path, options, read)?,
+        _ => mesh_scene(path, &references, read)?,
     };
     description.source = Some(path.to_path_buf());
+    description.files = found.into_files();
     Ok(description)
 }
 
-fn scene_file(path: &Path, options: &LoadOptions, read: &ReadMesh<'_>) -> Result<Description> {
+fn scene_file(
+    path: &Path,
+    options: &LoadOptions,
+    references: &References<'_>,
+    read: &ReadMesh<'_>,
+) -> Result<Description> {
     let bytes = unpack::read_file_within(path, SCENE_FILE_LIMIT)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let references = References { folder: Some(folder), allow_outside: options.allow_outside };
-    let read = |path: &Path| read(path, &references);
-    let files = MeshFiles { folder: Some(folder), allow_outside: options.allow_outside, read: &read };
+    let read = |path: &Path| read(path, references);
+    let References { folder, allow_outside, found } = *references;
+    let files = MeshFiles { folder, allow_outside, found, read: &read };
     kdl::parse(path, &stem(path), &bytes, &options.set, &files)
 }
 
-fn gltf_scene(path: &Path, options: &LoadOptions) -> Result<Description> {
+fn gltf_scene(path: &Path, options: &LoadOptions, references: &References<'_>) -> Result<Description> {
     let bytes = unpack::read_file(path)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let references = References { folder: Some(folder), allow_outside: options.allow_outside };
-    let mut description = gltf::parse(path, &stem(path), &bytes, &references)?;
+    let mut description = gltf::parse(path, &stem(path), &bytes, references)?;
     description.joins &= !options.apart;
     Ok(description)
 }
@@ -118,10 +124,8 @@ fn check_options(scene: &str, kind: &str, options: &LoadOptions) -> Result<()> {
 }
 
 /// A scene of one mesh.
-fn mesh_scene(path: &Path, options: &LoadOptions, read: &ReadMesh<'_>) -> Result<Description> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let references = References { folder: Some(folder), allow_outside: options.allow_outside };
-    let MeshFile { mut mesh, digest, looks } = read(path, &references)?;
+fn mesh_scene(path: &Path, references: &References<'_>, read: &ReadMesh<'_>) -> Result<Description> {
+    let MeshFile { mut mesh, digest, looks } = read(path, references)?;
     let mut description = Description::new(stem(path));
     let digest = match looks.digests.as_slice() {
         [] => digest,

@@ -1,6 +1,7 @@
 //! References from a scene file to other files: relative to its folder, and not out of it.
 
 use std::path::{Component, Path, PathBuf};
+use std::sync::Mutex;
 
 use super::text;
 
@@ -11,6 +12,27 @@ pub struct References<'a> {
     pub folder: Option<&'a Path>,
     /// Whether references may leave the folder.
     pub allow_outside: bool,
+    /// Who keeps which files were meant.
+    pub found: Option<&'a Found>,
+}
+
+/// Files that references meant.
+#[derive(Debug, Default)]
+pub struct Found(Mutex<Vec<PathBuf>>);
+
+impl Found {
+    fn add(&self, file: &Path) {
+        // A list that was left in the middle of a panic is still a list.
+        let mut files = self.0.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if !files.iter().any(|known| known == file) {
+            files.push(file.to_path_buf());
+        }
+    }
+
+    /// The files, by their real names, each once.
+    pub fn into_files(self) -> Vec<PathBuf> {
+        self.0.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
 }
 
 impl References<'_> {
@@ -65,6 +87,9 @@ impl References<'_> {
         if !self.allow_outside && !file.starts_with(&folder) {
             return Err(outside());
         }
+        if let Some(found) = self.found {
+            found.add(&file);
+        }
         Ok(file)
     }
 }
@@ -87,7 +112,7 @@ mod tests {
         for file in [root.join("maps/a.png"), models.join("b.png"), folder.path().join("c.png")] {
             std::fs::write(file, "x").unwrap();
         }
-        let references = References { folder: Some(&root), allow_outside: false };
+        let references = References { folder: Some(&root), allow_outside: false, found: None };
         let found = |written: &str| references.resolve_from(&models, written);
         let real = |path: &Path| path.canonicalize().unwrap();
         assert_eq!(found("b.png").unwrap(), real(&models.join("b.png")));

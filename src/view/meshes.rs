@@ -96,7 +96,7 @@ mod tests {
         let path = dir.path().join("a.obj");
         std::fs::write(&path, TRIANGLE).unwrap();
         let meshes = Meshes::default();
-        let references = References { folder: Some(dir.path()), allow_outside: false };
+        let references = References { folder: Some(dir.path()), allow_outside: false, found: None };
         let read = || meshes.read(&path, &references);
         let first = read().unwrap();
         assert_eq!((first.mesh.triangles.len(), read().unwrap().digest), (1, first.digest));

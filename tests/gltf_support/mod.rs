@@ -42,7 +42,7 @@ pub fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
 }
 
 pub fn parse(bytes: &[u8]) -> Result<Description> {
-    gltf::parse(Path::new("t.gltf"), "t", bytes, &References { folder: None, allow_outside: false })
+    gltf::parse(Path::new("t.gltf"), "t", bytes, &References { folder: None, allow_outside: false, found: None })
 }
 
 /// The scene of a binary file.

@@ -68,7 +68,7 @@ fn pictures_stand_upright_on_cones() {
         truncated(1.5, 1.5),
         truncated(1.5, 1.25),
     ] {
-        let files = MeshFiles { folder: None, allow_outside: false, read: &|_| panic!("no meshes here") };
+        let files = MeshFiles { folder: None, allow_outside: false, found: None, read: &|_| panic!("no meshes here") };
         let scene = format!("material \"m\"\n{text}");
         let mut d = parse(Path::new("t.kdl"), "t", scene.as_bytes(), &[], &files).unwrap();
         let mut material = lamp(1.0);

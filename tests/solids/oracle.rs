@@ -153,6 +153,21 @@ fn many_leaves<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, n:
     assert!(sum.hits > sum.rays / 4, "only {} of {} rays hit", sum.hits, sum.rays);
 }
 
+/// Trees beside a slab a thousand wide, which tells how near boundaries are one: nearer than what is small is told apart.
+fn beside_a_slab<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, n: usize) {
+    let beside = |seed: u64| {
+        let mut r = Random(seed);
+        let mut tree = SolidTree::new("beside a slab");
+        let small = grow(&mut tree, &mut r, 1 + (seed % 3) as usize, 8);
+        let slab = tree.solid(cuboid(DVec3::new(-500.0, -500.0, -31.0), DVec3::new(500.0, 500.0, -30.0)));
+        let kind = [NodeKind::Union, NodeKind::Xor][seed as usize % 2];
+        tree.root = tree.op(kind(vec![slab, small]));
+        tree
+    };
+    let sum = sum_over::<S>(precision, seeds, n, beside);
+    assert!(sum.hits > sum.rays / 8, "only {} of {} rays hit", sum.hits, sum.rays);
+}
+
 /// Boxes in one mesh: beside, across and inside each other, some of them turned inwards, alone and cut by a ball.
 fn meshes_of_boxes<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>, n: usize) {
     let boxes = |seed: u64| {
@@ -176,6 +191,16 @@ fn meshes_of_boxes<S: Engines>(precision: Precision, seeds: std::ops::Range<u64>
     };
     let sum = sum_over::<S>(precision, seeds, n, boxes);
     assert!(sum.hits > sum.rays / 8, "only {} of {} rays hit", sum.hits, sum.rays);
+}
+
+#[test]
+fn beside_a_slab_f64() {
+    beside_a_slab::<f64>(Precision::F64, 30_000..30_000 + size().0, size().1);
+}
+
+#[test]
+fn beside_a_slab_f32() {
+    beside_a_slab::<f32>(Precision::F32, 30_000..30_000 + size().0, size().1);
 }
 
 #[test]

@@ -60,6 +60,6 @@ pub fn load(name: &str, set: &[(String, String)]) -> Result<Description> {
     };
     let file = PathBuf::from(format!("builtin:{name}"));
     let read = |path: &std::path::Path| Err(Error::whole(path, "built-in scenes read no files"));
-    let files = MeshFiles { folder: None, allow_outside: false, read: &read };
+    let files = MeshFiles { folder: None, allow_outside: false, found: None, read: &read };
     kdl::parse(&file, name, text.as_bytes(), set, &files)
 }

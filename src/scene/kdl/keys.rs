@@ -67,7 +67,7 @@ mod tests {
     fn scene(text: &str, frame: Option<&str>) -> Result<Description> {
         let set: Vec<_> = frame.iter().map(|value| ("frame".to_string(), value.to_string())).collect();
         let read = |_: &Path| unreachable!("no meshes");
-        let files = MeshFiles { folder: None, allow_outside: false, read: &read };
+        let files = MeshFiles { folder: None, allow_outside: false, found: None, read: &read };
         crate::scene::kdl::parse(Path::new("s.kdl"), "s", text.as_bytes(), &set, &files)
     }
 

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::scene::description::{Description, Material};
 use crate::scene::mesh::Mesh;
 use crate::scene::obj::looks::Looks;
-use crate::scene::reference::References;
+use crate::scene::reference::{Found, References};
 
 /// Most triangles that generators and polygons of one document may make.
 pub const MAX_GENERATED: u64 = 1 << 24;
@@ -30,6 +30,8 @@ pub struct MeshFiles<'a> {
     pub folder: Option<&'a Path>,
     /// Whether references may leave the folder.
     pub allow_outside: bool,
+    /// Who keeps which files were meant.
+    pub found: Option<&'a Found>,
     /// Reads and parses a mesh file.
     pub read: &'a dyn Fn(&Path) -> Result<MeshFile>,
 }
@@ -40,7 +42,7 @@ impl MeshFiles<'_> {
     /// # Errors
     /// Those of [`References::resolve`].
     pub fn resolve(&self, written: &str) -> std::result::Result<PathBuf, String> {
-        References { folder: self.folder, allow_outside: self.allow_outside }.resolve(written)
+        References { folder: self.folder, allow_outside: self.allow_outside, found: self.found }.resolve(written)
     }
 }
 

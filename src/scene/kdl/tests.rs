@@ -19,7 +19,7 @@ fn read_fake(path: &Path) -> Result<meshes::MeshFile> {
 
 fn scene_with(text: &str, set: &[(&str, &str)]) -> Result<Description> {
     let set: Vec<_> = set.iter().map(|(n, v)| (n.to_string(), v.to_string())).collect();
-    let files = MeshFiles { folder: None, allow_outside: false, read: &read_fake };
+    let files = MeshFiles { folder: None, allow_outside: false, found: None, read: &read_fake };
     parse(Path::new("t.kdl"), "t", text.as_bytes(), &set, &files)
 }
 
@@ -202,7 +202,7 @@ fn mesh_files_are_read_once_and_bring_their_materials() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.ply"), "").unwrap();
     let read = |path: &Path| read_fake(path);
-    let files = MeshFiles { folder: Some(folder.path()), allow_outside: false, read: &read };
+    let files = MeshFiles { folder: Some(folder.path()), allow_outside: false, found: None, read: &read };
     let text = b"units m; mesh \"a.ply\"; mesh \"./a.ply\" units=mm { translate 1 0 0 }";
     let d = parse(Path::new("t.kdl"), "t", text, &[], &files).unwrap();
     assert_eq!((d.meshes.len(), d.groups[0].items.len()), (1, 2));
