@@ -13,6 +13,7 @@ mod cone;
 mod cuboid;
 mod cylinder;
 mod disc;
+mod edges;
 mod elliptic_torus;
 mod facts;
 mod half_space;
@@ -32,6 +33,7 @@ pub use cone::Cone;
 pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use disc::Disc;
+pub use edges::around;
 pub use elliptic_torus::{elliptic_torus, elliptic_torus_normal};
 pub use facts::Facts;
 pub use half_space::HalfSpace;
@@ -41,7 +43,7 @@ pub use span::{Solid, Span};
 pub use sphere::{Sphere, SphereRecord, WorldSphere};
 pub use taper::{taper, taper_normal, taper_side_normal};
 pub use torus::{torus, torus_normal};
-pub use triangle::{Degenerate, Triangle, TriangleBlock, Turned, around};
+pub use triangle::{Degenerate, Triangle, TriangleBlock, Turned};
 
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,8 @@
 //!
 //! Source: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. Departures:
 //! * Edge functions are `mul, mul, sub` and never fused: exactly antisymmetric, so both neighbours of an edge see
-//!   the same number with opposite sign, and their signs are never wrong, at worst zero.
+//!   the same number with opposite sign, and their signs are never wrong, at worst zero. Of a triangle that may be hit,
+//!   and one is zero, the products' roundings say the sign: seen edge-on all are zero or nearly, also far beside it.
 //! * Zero counts as inside for both neighbours (the tie rule then decides), so no double-precision restart is
 //!   needed on edges. It is kept for determinants that under- or overflow the precision.
 //! * The winding is not looked at: both sides are hit.
@@ -17,10 +18,11 @@
 use glam::DVec3;
 
 use super::block::{BLOCK, Block};
+use super::edges::{Edges, around};
 use super::facts::Facts;
 use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, map3};
 use crate::math::Aabb;
-use crate::ray::slab::{Interval, pad};
+use crate::ray::slab::Interval;
 use crate::ray::{Candidate, Packet};
 
 /// The triangle kind: nine numbers, three corners' x, y, z.
@@ -156,9 +158,14 @@ impl Triangle {
         while wanted != 0 {
             let i = wanted.trailing_zeros() as usize & (BLOCK - 1);
             wanted &= wanted - 1;
-            let maybe = V::Mask::from_bits(maybe[i]);
+            let mut maybe = V::Mask::from_bits(maybe[i]);
             let n = block.get(i);
-            let candidate = Self::accept(packet, &Facts::of(&n), maybe, edges(i).functions, true, |_| n);
+            let mut edges = edges(i);
+            if (edges.vague() & maybe).any() {
+                edges = Edges::told(&[org, packet.shear], K, &n.map(V::splat));
+                maybe = maybe & !edges.outside();
+            }
+            let candidate = Self::accept(packet, &Facts::of(&n), maybe, edges.functions, true, |_| n);
             found(&candidate, lanes, block.prim[i]);
         }
     }
@@ -169,9 +176,15 @@ impl Triangle {
     pub fn candidates<S: Real>(ray: &Turned<S>, t_min: S, t_max: S, block: &TriangleBlock<S>) -> (u32, [S::Octo; 3]) {
         let rcp = S::Octo::splat(ray.rcp);
         let corners = |f: usize| S::Octo::load(&block.fields[f]);
-        let edges = Edges::new(map3(ray.org, S::Octo::splat), map3(ray.shear, S::Octo::splat), ray.axis, corners);
+        let (org, shear) = (map3(ray.org, S::Octo::splat), map3(ray.shear, S::Octo::splat));
+        let mut edges = Edges::new(org, shear, ray.axis, corners);
         let aside = edges.aside(rcp, S::Octo::splat(t_min), S::Octo::splat(t_max));
-        ((!(edges.outside() | aside)).bits(), edges.functions)
+        let mut maybe = (!(edges.outside() | aside)).bits();
+        if maybe != 0 && edges.vague().bits() & maybe != 0 {
+            edges = Edges::told(&[org, shear], ray.axis, &std::array::from_fn(corners));
+            maybe &= !edges.outside().bits();
+        }
+        (maybe, edges.functions)
     }
 
     /// One ray, the same in all lanes, against those of its [`Triangle::candidates`] whose bits are set in `slots`; `edges`: their
@@ -277,15 +290,6 @@ impl Triangle {
     }
 }
 
-/// The components along an axis and the two that follow it.
-#[inline(always)]
-pub fn around<T: Copy>(v: [T; 3], axis: usize) -> [T; 3] {
-    map3(AROUND[axis & 3], |a| v[a])
-}
-
-/// Each axis with the two that follow it; the last row fills up to a power of two.
-const AROUND: [[usize; 3]; 4] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 1, 2]];
-
 /// What the test of one ray needs, the components along its dominant axis first, then along the two that follow it.
 #[derive(Clone, Copy, Debug)]
 pub struct Turned<S> {
@@ -304,47 +308,6 @@ impl<S: Real> Turned<S> {
     #[inline(always)]
     pub fn of(ray: &Packet<S>, axis: usize) -> Self {
         Self { axis, org: around(ray.org, axis), shear: ray.shear, rcp: ray.rcp[axis] }
-    }
-}
-
-/// Edge functions of `N` ray-triangle pairs in the rays' sheared frames, and the corners' distances along the dominant
-/// axis.
-struct Edges<V> {
-    depth: [V; 3],
-    functions: [V; 3],
-}
-
-impl<V: Lanes> Edges<V> {
-    /// For rays with this dominant axis, their origins [`around`] it; `corner(f)` gives field `f` of the triangles.
-    #[inline(always)]
-    fn new(org: Lanes3<V>, shear: Lanes3<V>, axis: usize, corner: impl Fn(usize) -> V) -> Self {
-        let [k, kx, ky] = AROUND[axis & 3];
-        let sheared = |i: usize| {
-            let z = corner(3 * i + k) - org[0];
-            let x = shear[0].mul_add(z, corner(3 * i + kx) - org[1]);
-            let y = shear[1].mul_add(z, corner(3 * i + ky) - org[2]);
-            (x, y, z)
-        };
-        let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (sheared(0), sheared(1), sheared(2));
-        Self { depth: [az, bz, cz], functions: [cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax] }
-    }
-
-    /// Pairs with edge functions of both signs. A NaN (overflow) is never outside: the restart decides.
-    #[inline(always)]
-    fn outside(&self) -> V::Mask {
-        let zero = V::constant(0.0);
-        let [u, v, w] = self.functions;
-        let (low, high) = (u.fast_min(v).fast_min(w), u.fast_max(v).fast_max(w));
-        low.cmp_lt(zero) & zero.cmp_lt(high)
-    }
-
-    /// Pairs whose corners are all beyond `t_max` or all before `t_min`; `rcp`: of the directions along the dominant axis.
-    #[inline(always)]
-    fn aside(&self, rcp: V, t_min: V, t_max: V) -> V::Mask {
-        // The same slab as that of the triangle's own box, which its parameter is moved into.
-        let [a, b, c] = map3(self.depth, |z| z * rcp);
-        let (near, far) = (a.fast_min(b).fast_min(c), a.fast_max(b).fast_max(c));
-        t_max.cmp_lt(near) | pad(far).cmp_lt(t_min)
     }
 }
 

@@ -44,6 +44,30 @@ fn closed_form(ray: Ray, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
     [s.cross(e1).dot(e2) / det, ray.1.cross(e2).dot(s) / det, s.cross(e1).dot(ray.1) / det]
 }
 
+/// Rays in the planes of triangles that lie beside them.
+fn beside_in_their_plane<S: Real>() {
+    let mut r = Random(17);
+    for i in 0..20_000 {
+        let (org, dir) = exact((r.cube(), r.cube().normalize()));
+        let aside = dir.any_orthonormal_pair();
+        let turn = r.cube().x * std::f64::consts::PI;
+        let aside = aside.0 * turn.cos() + aside.1 * turn.sin();
+        let corners = [0; 3].map(|_| {
+            let place = r.cube();
+            org + dir * (2.0 * place.x) + aside * (0.55 + 0.5 * place.y)
+        });
+        let Ok(record) = Triangle::record::<S>(corners) else { continue };
+        let found = hit::<S>((org, dir), &record);
+        assert!(found.is_none(), "ray {i}: {found:?} of {corners:?} from {org} along {dir}");
+    }
+}
+
+#[test]
+fn triangles_beside_a_ray_in_their_plane_are_missed() {
+    beside_in_their_plane::<f32>();
+    beside_in_their_plane::<f64>();
+}
+
 fn random_corners(r: &mut Random) -> [DVec3; 3] {
     loop {
         let corners = [r.cube(), r.cube(), r.cube()].map(|p| (p * 2.0).as_vec3().as_dvec3());
