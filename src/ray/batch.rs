@@ -13,7 +13,8 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// Batches are padded to a multiple of this many rays (the widest packet).
 pub const PAD: usize = 16;
 
-/// A batch of rays, world space. `org` and `dir` hold the x, y and z arrays; directions need not be unit.
+/// A batch of rays, world space. `org` and `dir` hold the x, y and z arrays; directions need not be unit, but squares of their
+/// lengths, also in the space of instances and shapes, must neither vanish nor overflow: in f32 lengths of 1e-18 to 1e18 are traced.
 /// A ray with `t_max < t_min`, a NaN or infinity in origin or direction, or a zero direction is dead: it misses.
 #[derive(Clone, Debug, Default)]
 pub struct Rays<S> {
