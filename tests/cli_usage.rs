@@ -164,6 +164,40 @@ fn files_of_a_scene_are_not_written_over() {
     assert_eq!(ended.code, Some(0), "{}", ended.err);
 }
 
+/// Nor by the pictures of several frames, of a view, or those that a bench leaves beside its rows; before any work is done.
+#[test]
+fn files_of_a_scene_outlive_frames_views_and_benches() {
+    let dir = folder();
+    let (at, run) = (dir.path(), |line: &str| lanecast(dir.path(), &line.split(' ').collect::<Vec<_>>()));
+    std::fs::write(at.join("ball.kdl"), "sphere radius=1\n").expect("a scene");
+    let ended = run("render ball.kdl -o sky.exr --size 16x8");
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+    let sky = std::fs::read(at.join("sky.exr")).expect("a picture");
+    for (scene, picture) in [("sky.kdl", "sky.exr"), ("turn.kdl", "sky.0002.exr")] {
+        std::fs::write(at.join(picture), &sky).expect("a picture");
+        std::fs::write(at.join(scene), format!("environment \"{picture}\"\nsphere radius=1\n")).expect("a scene");
+    }
+    std::fs::write(at.join("script.txt"), "wait\nsave ./sky.exr\n").expect("a script");
+    let before = binary::files(at);
+    let read = "expected another file to write to; this one is read";
+    for (line, name) in [
+        ("render turn.kdl -o sky.exr --frames 1..2 --size 8x8", "sky.0002.exr"),
+        ("bench ball.kdl sky.kdl -o . --size 8x8 --rays primary --engines scalar --repeat 1", "./sky.exr"),
+    ] {
+        refused(at, &line.split(' ').collect::<Vec<_>>(), &format!("{name}: {read}"));
+    }
+    let ended = run("view sky.kdl --size 8x8 --headless-script script.txt");
+    assert_eq!(ended.code, Some(2), "{}", ended.err);
+    assert!(ended.err.contains(&format!("script.txt:2:1: ./sky.exr: {read}")), "{}", ended.err);
+    assert_eq!(binary::files(at), before);
+    for picture in ["sky.exr", "sky.0002.exr"] {
+        assert!(std::fs::read(at.join(picture)).expect("the picture") == sky, "{picture}");
+    }
+    // Where nothing is replaced, nothing is refused.
+    let ended = run("render turn.kdl -o sky.exr --frames 3..3 --size 8x8");
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+}
+
 /// Whatever says what is measured has no meaning where nothing is, or where a file says it.
 #[test]
 fn options_without_effect_are_refused() {

@@ -11,7 +11,7 @@ use super::interrupt::stopped;
 use super::output::{json_to_stdout, to_stdout};
 use super::render::{self, RenderArgs};
 use crate::error::{Error, Result};
-use crate::film::{check_folder, write_atomically};
+use crate::film::{check_apart, check_folder, write_atomically};
 use crate::measure::bench::{self, Plan};
 use crate::measure::compare::{self, Change, Comparison};
 use crate::measure::env;
@@ -170,6 +170,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
         history::check_revision(env::REVISION, args.dirty)?;
     }
     args.invitation().check()?;
+    args.folder.iter().try_for_each(|dir| check_pictures(args, dir))?;
     // Peers ask for it, and then our engines get it too.
     let mut workers = Workers::new(args.threads.count())?.flushing(!args.peers.is_empty());
     if args.scaling {
@@ -267,15 +268,38 @@ fn stem(name: &str) -> String {
     name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect()
 }
 
-/// What the rays saw: one EXR per scene, named after it as its rows are.
+/// A scene and its picture's place in `dir`, named after it as its rows are; `names` are those of the scenes before.
+fn with_picture(args: &BenchArgs, scene: &str, dir: &Path, names: &mut Vec<String>) -> Result<(Description, PathBuf)> {
+    // What it is shown without is said when it is measured.
+    let quiet = OutputArgs { quiet: true, ..OutputArgs::default() };
+    let description = args.options.seen_by(scene, &args.camera)?.load(scene, &quiet)?;
+    let path = dir.join(format!("{}.exr", stem(&unlike(&description.name, names))));
+    Ok((description, path))
+}
+
+/// Checks that the pictures will replace none of the files that the scenes are read from.
+fn check_pictures(args: &BenchArgs, dir: &Path) -> Result<()> {
+    // Only what is there can be replaced: in a new folder no scene has to be opened for it.
+    let is_picture = |file: PathBuf| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    if !std::fs::read_dir(dir).is_ok_and(|entries| entries.flatten().any(|entry| is_picture(entry.path()))) {
+        return Ok(());
+    }
+    let (mut names, mut paths, mut inputs) = (Vec::new(), Vec::new(), Vec::new());
+    for scene in scenes(args) {
+        // Without all scenes there will be no picture; which one cannot be opened is said when its turn comes.
+        let Ok((description, path)) = with_picture(args, &scene, dir, &mut names) else { return Ok(()) };
+        paths.push(path);
+        inputs.extend(description.inputs().into_iter().map(Path::to_path_buf));
+    }
+    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    paths.iter().try_for_each(|path| check_apart(path, &inputs))
+}
+
+/// What the rays saw: one EXR per scene.
 fn pictures(args: &BenchArgs, dir: &Path) -> Result<()> {
     let mut names = Vec::new();
     for scene in scenes(args) {
-        // What it is shown without was said when it was measured.
-        let quiet = OutputArgs { quiet: true, ..OutputArgs::default() };
-        let description = args.options.seen_by(&scene, &args.camera)?.load(&scene, &quiet)?;
-        let name = unlike(&description.name, &mut names);
-        let path = dir.join(format!("{}.exr", stem(&name)));
+        let (description, path) = with_picture(args, &scene, dir, &mut names)?;
         let scene = SceneArgs { scene, options: args.options.clone() };
         let mut picture = RenderArgs::plain(scene, args.camera.clone(), args.threads, path);
         picture.output.quiet = args.output.quiet;

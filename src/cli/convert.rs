@@ -121,8 +121,7 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     check_file(&args.file)?;
     check_apart(&args.file, &[Path::new(&args.scene.scene)])?;
     let description = args.scene.load(&args.output)?;
-    let files: Vec<&Path> = description.files.iter().map(PathBuf::as_path).collect();
-    check_apart(&args.file, &files)?;
+    check_apart(&args.file, &description.inputs())?;
     with_pool(args.threads.count(), || {
         let solids = Solids::new(&description, &args.solid)?;
         if solids.left_out > 0 {

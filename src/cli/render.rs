@@ -5,7 +5,7 @@ mod kept;
 mod plain;
 mod report;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::ProgressBar;
@@ -164,11 +164,10 @@ impl RenderArgs {
         self.files.iter().flat_map(|file| files(file, &planes)).try_for_each(|file| check_file(&file))
     }
 
-    /// Checks that they replace none of the files that the scene refers to.
-    fn check_apart(&self, description: &Description, options: &RenderOptions) -> Result<()> {
+    /// Checks that they replace none of `inputs`, files that a scene is read from.
+    fn check_apart(&self, inputs: &[&Path], options: &RenderOptions) -> Result<()> {
         let planes = options.planes();
-        let inputs: Vec<&Path> = description.files.iter().map(PathBuf::as_path).collect();
-        self.files.iter().flat_map(|file| files(file, &planes)).try_for_each(|file| check_apart(&file, &inputs))
+        self.files.iter().flat_map(|file| files(file, &planes)).try_for_each(|file| check_apart(&file, inputs))
     }
 
     /// Whether all that is wanted of the picture are the levels of `.pix` files.
@@ -200,7 +199,7 @@ pub(super) fn of_scene(args: &RenderArgs, description: &Description) -> Result<(
 }
 
 fn still(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
-    args.check_apart(description, options)?;
+    args.check_apart(&description.inputs(), options)?;
     if options.integrator == Integrator::Rt {
         check_rt(description, args.scene.options.lenient, &args.output)?;
     }

@@ -4,7 +4,7 @@
 //! Space: right-handed, lengths in scene units. Angles are radians here (degrees only in files). An affine map
 //! takes points of the item's local space to its parent's.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
@@ -169,6 +169,11 @@ pub enum Projection {
 }
 
 impl Description {
+    /// All files that it was read from: its own, and those that it refers to.
+    pub fn inputs(&self) -> Vec<&Path> {
+        self.source.iter().chain(&self.files).map(PathBuf::as_path).collect()
+    }
+
     /// An empty scene with the default material and an empty root group.
     pub fn new(name: impl Into<String>) -> Self {
         Self {

@@ -13,7 +13,7 @@ use super::reload::Source;
 use super::script::{Line, Step};
 use super::stage::Stage;
 use crate::error::{Error, Result, locked};
-use crate::film::{Film, Window};
+use crate::film::{Film, Window, check_apart};
 use crate::render::progressive::{self, Framebuffer, Viewer};
 use crate::render::{Progress, RenderOutput};
 
@@ -115,6 +115,7 @@ impl Studio<'_> {
                 let Some(output) = last else {
                     return Err(Error::Usage("nothing to save: expected `wait` or `frame` before".into()));
                 };
+                check_apart(path, &self.stage.description().inputs())?;
                 (self.save)(path, &output.film, &self.view)?;
                 None
             }

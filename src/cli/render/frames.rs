@@ -1,5 +1,6 @@
 //! `render --frames A..B`: the pictures of an animation, one file per frame.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::{RenderArgs, check_rt, options, picture};
@@ -60,10 +61,18 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         of_frame.scene.options.set.push((FRAME.into(), frame.to_string()));
         of_frame
     };
-    let describe = |of_frame: RenderArgs| {
-        let SceneArgs { scene, options } = &of_frame.scene;
-        let description = options.load_with(scene, &|path, references| meshes.read(path, references))?;
-        Ok::<_, Error>((of_frame, description))
+    // A file that one frame is read from is not to be replaced by the picture of another one, either. Nearly always the files are
+    // those of the frame before.
+    let mut known = HashSet::new();
+    let mut describe = |this: RenderArgs| {
+        let SceneArgs { scene, options: of_scene } = &this.scene;
+        let description = of_scene.load_with(scene, &|path, references| meshes.read(path, references))?;
+        let new: Vec<&Path> =
+            description.inputs().into_iter().filter(|file| known.insert(file.to_path_buf())).collect();
+        if !new.is_empty() {
+            (frames.first..=frames.last).map(of_frame).try_for_each(|any| any.check_apart(&new, &options))?;
+        }
+        Ok::<_, Error>((this, description))
     };
     let is_wanted = |of_frame: &RenderArgs| {
         let mut all = of_frame.files.iter().flat_map(|file| files(file, &planes));
