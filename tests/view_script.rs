@@ -183,6 +183,41 @@ fn shaders_that_rt_does_not_know_are_refused_whenever_it_is_chosen() {
     assert_eq!(ended.code, Some(0), "{}", ended.err);
 }
 
+/// What it may not be changed to by hand, it is not changed to by an edit of the file: the last good picture stays.
+#[test]
+fn shaders_that_rt_does_not_know_are_refused_when_a_file_brings_them() {
+    let dir = folder("integrator rt\nwait\nsave a.exr\nreload 30\nwait\nsave b.exr\n");
+    let write = |shader: &str| {
+        let text = format!(
+            "title {{t}}\nunits mm\nput {{a.s}} sph V {{0 0 0}} A {{10 0 0}} B {{0 10 0}} C {{0 0 10}}\n\
+             put {{a.r}} comb region yes shader {{{shader}}} tree {{l a.s}}\n"
+        );
+        // In one step: half a file would be another mistake.
+        let (new, file) = (dir.path().join("new"), dir.path().join("ball.asc"));
+        std::fs::write(&new, text).unwrap();
+        std::fs::rename(new, file).unwrap();
+    };
+    write("plastic");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
+        .args(["view", "ball.asc", "--size", "16x16", "--headless-script", "script.txt"])
+        .current_dir(dir.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the binary");
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut next = || serde_json::from_str::<Value>(&lines.next().expect("a line").unwrap()).unwrap();
+    assert_eq!(next()["command"], "wait");
+    write("wood");
+    let reload = next();
+    let error = reload["error"].as_str().expect("an error");
+    assert!(error.contains("the shader `wood` of region /a.r is not supported; --lenient"), "{error}");
+    assert_eq!(reload["changed"], false, "the scene is what it was");
+    assert_eq!(next()["complete"], true);
+    assert!(child.wait().unwrap().success());
+    let [a, b] = ["a.exr", "b.exr"].map(|name| exr::read(&dir.path().join(name)).unwrap());
+    assert!(a == b, "the last good picture");
+}
+
 const SCENE: &str = "camera \"c\" { eye 0 0 6; look-at 0 0 0; up 0 1 0; fov 40 }\n\
     difference { box { size 2 2 2 }; sphere radius=RADIUS }\n";
 

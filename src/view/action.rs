@@ -67,6 +67,14 @@ pub struct View {
 }
 
 impl View {
+    /// Checks that `stage`, which is to take the place of another one, can be shown as that is shown.
+    ///
+    /// # Errors
+    /// A usage error for a scene that the integrator cannot show.
+    pub fn check(&self, stage: &dyn Stage) -> Result<()> {
+        obstacle(stage, self.look.options.integrator, self.lenient).map_or(Ok(()), |what| Err(Error::Usage(what)))
+    }
+
     /// Does what `action` asks.
     ///
     /// # Errors
@@ -150,7 +158,7 @@ fn known_integrator(stage: &dyn Stage, name: &str, lenient: bool) -> Result<Inte
     obstacle(stage, integrator, lenient).map_or(Ok(integrator), |what| Err(Error::Usage(what)))
 }
 
-/// Why `integrator` cannot show the scene, if so: what a view may not begin with, it may not be changed to.
+/// Why `integrator` cannot show the scene, if so: what a view may not begin with, neither it nor the scene may be changed to.
 fn obstacle(stage: &dyn Stage, integrator: Integrator, lenient: bool) -> Option<String> {
     if integrator != Integrator::Rt {
         return None;

@@ -182,7 +182,11 @@ impl Studio<'_> {
                 return Ok(json!({ "command": command, "changed": false }));
             };
             let clock = Instant::now();
-            let stage = match self.source.open(Some(&*self.stage)) {
+            let opened = self.source.open(Some(&*self.stage)).and_then(|new| {
+                new.iter().try_for_each(|stage| self.view.check(&**stage))?;
+                Ok(new)
+            });
+            let stage = match opened {
                 // A file was written, but the scene is what it was.
                 Ok(None) => continue,
                 Ok(Some(stage)) => stage,

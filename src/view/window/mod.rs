@@ -84,8 +84,12 @@ fn watch(studio: &Studio<'_>, shared: &Shared, pool: &rayon::ThreadPool, message
         let before = shared.wanted().stage;
         match pool.install(|| studio.source.open(Some(&*before))) {
             Ok(Some(stage)) => {
-                tell(None);
-                shared.change(|wanted| wanted.stage = stage);
+                let shown = shared.change(|wanted| {
+                    wanted.view.check(&*stage)?;
+                    wanted.stage = stage;
+                    Ok::<_, Error>(())
+                });
+                tell(shown.err().map(|error| error.to_string()));
             }
             // As it was: an error before it is put right.
             Ok(None) => {
