@@ -98,6 +98,8 @@ fn refusals_say_what_is_expected() {
         ("render square.ply -o a.exr --crop 0,0,9999,5", "leaves the picture"),
         ("render square.ply -o a.exr --camera front", "no camera `front`"),
         ("render square.ply -o a.exr --eye 1,1,1 --look-at 1,1,1", "same point"),
+        ("render square.ply -o a.exr --eye 0,5,0 --look-at 0,0,0 --up 0,1,0", "--up must not point along the view"),
+        ("view square.ply --eye 0,5,0 --look-at 0,0,0 --up 0,-2,0", "--up must not point along the view"),
         ("render square.ply -o a.exr --ao-radius -1", "radius"),
         ("render square.ply -o no/such/folder/a.exr", "no/such/folder"),
         ("render square.ply -o a.exr --noise -1", "noise -1: expected a positive number"),

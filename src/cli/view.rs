@@ -54,7 +54,7 @@ impl CameraArgs {
     /// upper corner) in a picture of `size`; then `--eye`, `--look-at`, `--up` and `--fov` change it.
     ///
     /// # Errors
-    /// A usage error for an unknown name; a view script that cannot be read.
+    /// A usage error for an unknown name and for an `--up` along the view; a view script that cannot be read.
     pub fn choose(
         &self,
         description: &Description,
@@ -71,7 +71,12 @@ impl CameraArgs {
             (None, None) => framing(bounds, aspect),
         };
         let theta = self.fov.map(f64::to_radians);
-        Ok(CameraOverrides { eye: self.eye, look_at: self.look_at, up: self.up, theta }.apply(&camera))
+        let camera = CameraOverrides { eye: self.eye, look_at: self.look_at, up: self.up, theta }.apply(&camera);
+        // As in scene files: another direction would be taken, and nobody would know.
+        if self.up.is_some() && CameraDescription::is_along_view(camera.eye, camera.look_at, camera.up) {
+            return Err(Error::Usage("--up must not point along the view".into()));
+        }
+        Ok(camera)
     }
 
     /// As [`Self::choose`], ready to make rays. Views sample pixels where `rt` does.
@@ -209,6 +214,21 @@ mod tests {
         args.camera = Some("sid".into());
         let text = choose(&args).unwrap_err().to_string();
         assert!(text.contains("did you mean `side`") && text.contains("front, side"), "{text}");
+    }
+
+    #[test]
+    fn an_up_along_the_view_is_refused_only_where_it_was_given() {
+        let mut scene = Description::new("s");
+        scene.cameras = vec![camera("front")];
+        let above = CameraArgs { eye: Some(DVec3::Y * 5.0), ..Default::default() };
+        assert_eq!(above.choose(&scene, None, (4, 3)).unwrap().up, DVec3::Y);
+        for up in [DVec3::Y, DVec3::NEG_Y, DVec3::new(1e-10, 3.0, 0.0)] {
+            let text =
+                CameraArgs { up: Some(up), ..above.clone() }.choose(&scene, None, (4, 3)).unwrap_err().to_string();
+            assert!(text.contains("--up must not point along the view"), "{up}: {text}");
+        }
+        let tilted = CameraArgs { up: Some(DVec3::new(0.01, 1.0, 0.0)), ..above };
+        assert!(tilted.choose(&scene, None, (4, 3)).is_ok());
     }
 
     #[test]

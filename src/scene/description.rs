@@ -153,6 +153,15 @@ pub struct CameraDescription {
     pub projection: Projection,
 }
 
+impl CameraDescription {
+    /// Whether `up` points along the view from `eye` to `look_at`, either way, and so does not say what is up in the picture. Without
+    /// a view (both in one place) it does not.
+    pub fn is_along_view(eye: DVec3, look_at: DVec3, up: DVec3) -> bool {
+        let views = [look_at - eye, up].map(DVec3::try_normalize);
+        matches!(views, [Some(view), Some(up)] if view.cross(up).length() < 1e-9)
+    }
+}
+
 /// How a camera projects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {

@@ -173,10 +173,10 @@ pub fn camera(scope: &Scope<'_>, node: &Node<'_>) -> Result<CameraDescription> {
     let eye = fields.vector("eye")?.ok_or_else(|| fields.error("a camera needs an `eye`"))?;
     let look_at = fields.vector("look-at")?.unwrap_or(DVec3::ZERO);
     let up = fields.direction("up")?.unwrap_or(DVec3::Y);
-    let Some(view) = (look_at - eye).try_normalize() else {
+    if (look_at - eye).try_normalize().is_none() {
         return Err(fields.error_at("look-at", "`eye` and `look-at` must differ"));
-    };
-    if view.cross(up.normalize()).length() < 1e-9 {
+    }
+    if CameraDescription::is_along_view(eye, look_at, up) {
         return Err(fields.error_at("up", "`up` must not point along the view"));
     }
     let projection = match (fields.number("fov")?, fields.has("parallel")) {
