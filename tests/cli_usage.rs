@@ -132,6 +132,26 @@ fn inputs_are_not_written_over() {
     }
 }
 
+/// Two outputs are two files: the first would be lost. The scene and the pictures would be opened first: there are none, and nobody asks.
+#[test]
+fn outputs_are_not_written_over_by_each_other() {
+    let dir = folder();
+    for (line, name) in [
+        ("render none.ply -o x.npy -o x.Z.npy --aov Z", "x.Z.npy"),
+        ("render none.ply -o x.npy -o ./x.npy", "./x.npy"),
+        ("render none.kdl -o x.png -o y.png -o x.png --frames 1..2", "x.0001.png"),
+        ("compare none.exr none.exr -o d.png -o ./d.png", "./d.png"),
+    ] {
+        let what = format!("{name}: expected another file to write to; this one is written");
+        refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), &what);
+    }
+    assert_eq!(binary::files(dir.path()), Vec::<String>::new());
+    let line = "render builtin:die -o x.npy -o x.Z.npy -o x.png --size 8x8";
+    let ended = lanecast(dir.path(), &line.split(' ').collect::<Vec<_>>());
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+    assert_eq!(binary::files(dir.path()), ["x.Z.npy", "x.npy", "x.png"]);
+}
+
 /// Nor are the files that a scene refers to.
 #[test]
 fn files_of_a_scene_are_not_written_over() {

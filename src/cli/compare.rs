@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::film::exr::{Compression, ImageInfo};
 use crate::film::metrics::Viewing;
 use crate::film::picture::{self, Picture};
-use crate::film::{check_apart, check_file, exr, heat, npy};
+use crate::film::{check_apart, check_distinct, check_file, exr, heat, npy};
 use crate::measure::env::REVISION;
 use crate::measure::hitfiles::{self, FileAnswers, HitReport};
 use crate::measure::pictures::{self, Maps, Options, PictureReport};
@@ -166,6 +166,7 @@ fn images(args: &CompareArgs) -> Result<()> {
         return Err(Error::Usage("--scene and --rays are for files of hits".into()));
     }
     args.files.iter().try_for_each(|file| check_file(file).and_then(|()| check_apart(file, &[&args.a, &args.b])))?;
+    check_distinct(&args.files)?;
     let (a, b) = (picture::read(&args.a, args.size)?, picture::read(&args.b, args.size)?);
     let viewing = args.ppd.map_or_else(Viewing::default, |pixels_per_degree| Viewing { pixels_per_degree });
     let options = Options { exposure: args.exposure.unwrap_or(0.0), peak: args.peak.map(f64::from), viewing };

@@ -5,7 +5,7 @@ mod kept;
 mod plain;
 mod report;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use indicatif::ProgressBar;
@@ -18,7 +18,7 @@ use super::preview::{Job, PreviewArgs};
 use crate::camera::Filter;
 use crate::error::{Error, Result};
 use crate::film::exr::ImageInfo;
-use crate::film::{Window, check_apart, check_file};
+use crate::film::{Window, check_apart, check_distinct, check_file};
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
 use crate::render::{Aov, Progress, RenderOptions};
@@ -158,16 +158,22 @@ impl RenderArgs {
         self.resume && self.noise.is_none() && self.time_limit.is_none() && !self.preview.by_blocks()
     }
 
-    /// Checks that all files of the picture can be written.
-    fn check_files(&self, options: &RenderOptions) -> Result<()> {
+    /// All files of the picture, those of further planes, too.
+    fn all_files(&self, options: &RenderOptions) -> Vec<PathBuf> {
         let planes = options.planes();
-        self.files.iter().flat_map(|file| files(file, &planes)).try_for_each(|file| check_file(&file))
+        self.files.iter().flat_map(|file| files(file, &planes)).collect()
+    }
+
+    /// Checks that they can be written, each one beside the others.
+    fn check_files(&self, options: &RenderOptions) -> Result<()> {
+        let all = self.all_files(options);
+        all.iter().try_for_each(|file| check_file(file))?;
+        check_distinct(&all)
     }
 
     /// Checks that they replace none of `inputs`, files that a scene is read from.
     fn check_apart(&self, inputs: &[&Path], options: &RenderOptions) -> Result<()> {
-        let planes = options.planes();
-        self.files.iter().flat_map(|file| files(file, &planes)).try_for_each(|file| check_apart(&file, inputs))
+        self.all_files(options).iter().try_for_each(|file| check_apart(file, inputs))
     }
 
     /// Whether all that is wanted of the picture are the levels of `.pix` files.

@@ -1,5 +1,6 @@
 //! Files that appear whole or not at all.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -48,6 +49,32 @@ pub fn check_apart(path: &Path, inputs: &[&Path]) -> Result<()> {
         let (path, input) = (path.display(), input.display());
         Err(Error::Usage(format!("{path}: expected another file to write to; this one is read ({input})")))
     })
+}
+
+/// Checks that `paths`, the files that a command writes, are as many files, whatever links lead to them: of two in one place the
+/// first would be lost.
+///
+/// # Errors
+/// A usage error that names both; [`Error::Io`] with the path that [`write_atomically`] cannot write.
+pub fn check_distinct(paths: &[PathBuf]) -> Result<()> {
+    let mut places = HashMap::new();
+    for path in paths {
+        let place = place(path).map_err(|e| Error::io(path, e))?;
+        if let Some(other) = places.insert(place, path) {
+            let (path, other) = (path.display(), other.display());
+            return Err(Error::Usage(format!(
+                "{path}: expected another file to write to; this one is written ({other})"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Where [`write_atomically`] puts `path`, which need not be there.
+fn place(path: &Path) -> io::Result<PathBuf> {
+    let target = resolve(path)?;
+    let name = target.file_name().unwrap_or_default();
+    Ok(std::fs::canonicalize(folder_of(&target))?.join(name))
 }
 
 /// Checks that files can be written to the folder `path`, which is there or can be made; none is made.
@@ -212,6 +239,30 @@ mod tests {
             std::os::unix::fs::symlink(&a, &new).unwrap();
             let text = check_apart(&new, &[&b, &a]).unwrap_err().to_string();
             assert!(text.contains("this one is read"), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_written_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let [a, b, new] = ["a", "b", "new"].map(|name| dir.path().join(name));
+        fs::write(&a, b"a").unwrap();
+        let other_name = |name: &str| dir.path().join(".").join(name);
+        assert!(check_distinct(&[]).is_ok() && check_distinct(&[a.clone(), b.clone(), new.clone()]).is_ok());
+        for (first, second) in [(&a, &other_name("a")), (&b, &other_name("b")), (&new, &new)] {
+            let text = check_distinct(&[first.clone(), second.clone()]).unwrap_err().to_string();
+            assert!(text.starts_with(&second.display().to_string()) && text.contains("this one is written"), "{text}");
+        }
+        assert!(check_distinct(&[dir.path().join("none").join("a")]).is_err());
+        #[cfg(unix)]
+        {
+            // To what is there, and to what is not there yet.
+            for (file, link) in [(&a, "to_a"), (&b, "to_b")] {
+                let link = dir.path().join(link);
+                std::os::unix::fs::symlink(file, &link).unwrap();
+                assert!(check_distinct(&[file.clone(), link.clone()]).is_err());
+                assert!(check_distinct(&[new.clone(), link]).is_ok());
+            }
         }
     }
 

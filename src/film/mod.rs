@@ -20,7 +20,7 @@ pub mod srgb;
 
 mod input;
 
-pub use atomic::{Writer, check_apart, check_file, check_folder, write_atomically};
+pub use atomic::{Writer, check_apart, check_distinct, check_file, check_folder, write_atomically};
 pub use planes::{Film, Plane, PlaneData, Window};
 
 #[cfg(test)]

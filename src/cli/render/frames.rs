@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use super::{RenderArgs, check_rt, options, picture};
 use crate::cli::common::{SceneArgs, with_pool};
-use crate::cli::picture::files;
 use crate::error::{Error, Result};
 use crate::scene::description::{Description, Precision};
 use crate::scene::kdl::FRAME;
@@ -53,7 +52,7 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     if of_scene.set.iter().any(|(name, _)| name == FRAME) {
         return Err(Error::Usage(format!("--set {FRAME}: --frames sets it")));
     }
-    let (meshes, planes) = (Meshes::default(), options.planes());
+    let meshes = Meshes::default();
     let scene = args.scene.seen_by(&args.camera)?;
     let of_frame = |frame: u32| {
         let mut of_frame = RenderArgs { frames: None, scene: scene.clone(), ..args.clone() };
@@ -75,8 +74,7 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         Ok::<_, Error>((this, description))
     };
     let is_wanted = |of_frame: &RenderArgs| {
-        let mut all = of_frame.files.iter().flat_map(|file| files(file, &planes));
-        let is_there = args.resume && all.all(|file| file.exists());
+        let is_there = args.resume && of_frame.all_files(&options).iter().all(|file| file.exists());
         if is_there {
             args.output.say(&format!("{}: there already", of_frame.file()));
         }
