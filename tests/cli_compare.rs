@@ -142,7 +142,15 @@ fn what_does_not_compare_is_refused() {
     refused(at, &["compare", "half.exr", "scene.tif"], ".pfm");
     refused(at, &["compare", "half.png", "half.png", "--map", "hdr-flip", "-o", "a.png"], "linear light");
     refused(at, &["compare", "half.png", "half.png", "--max-hdr-flip", "1"], "HDR-FLIP");
-    refused(at, &["compare", "half.exr", "half.exr", "-o", "a.jpg"], "a.jpg");
+    // Not even the files before the one that is refused are written.
+    for (line, what) in [
+        ("half.exr half.exr -o d.exr -o a.jpg", "-o a.jpg: expected a name that ends in .exr or .png"),
+        ("half.png half.png -o d.exr -o d.png --map hdr-flip", "linear light"),
+        ("half.png half.png -o d.exr --max-hdr-flip 1", "HDR-FLIP"),
+    ] {
+        refused(at, &format!("compare {line}").split(' ').collect::<Vec<_>>(), what);
+        assert!(!at.join("d.exr").exists(), "{line}");
+    }
     for limit in
         ["max-rmse=nan", "max-relmse=inf", "min-psnr=nan", "min-ssim=-inf", "max-flip=NaN", "max-hdr-flip=1e999"]
     {

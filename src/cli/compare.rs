@@ -1,5 +1,6 @@
 //! `lanecast compare`: two pictures, or two files of hits.
 
+mod difference;
 mod table;
 
 use std::path::{Path, PathBuf};
@@ -7,13 +8,11 @@ use std::path::{Path, PathBuf};
 use super::common::{OutputArgs, SceneOptions, ThreadArgs, finite, size, with_pool};
 use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
-use crate::film::exr::{Compression, ImageInfo};
 use crate::film::metrics::Viewing;
-use crate::film::picture::{self, Picture};
-use crate::film::{check_apart, check_distinct, check_file, exr, heat, npy};
-use crate::measure::env::REVISION;
+use crate::film::picture;
+use crate::film::{check_apart, check_distinct, check_file, npy};
 use crate::measure::hitfiles::{self, FileAnswers, HitReport};
-use crate::measure::pictures::{self, Maps, Options, PictureReport};
+use crate::measure::pictures::{self, Options, PictureReport};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -165,14 +164,16 @@ fn images(args: &CompareArgs) -> Result<()> {
     if args.scene.is_some() {
         return Err(Error::Usage("--scene and --rays are for files of hits".into()));
     }
+    args.files.iter().try_for_each(|file| difference::kind(file).map(drop))?;
     args.files.iter().try_for_each(|file| check_file(file).and_then(|()| check_apart(file, &[&args.a, &args.b])))?;
     check_distinct(&args.files)?;
     let (a, b) = (picture::read(&args.a, args.size)?, picture::read(&args.b, args.size)?);
     let viewing = args.ppd.map_or_else(Viewing::default, |pixels_per_degree| Viewing { pixels_per_degree });
     let options = Options { exposure: args.exposure.unwrap_or(0.0), peak: args.peak.map(f64::from), viewing };
     let (report, maps) = pictures::compare(&a, &b, &options)?;
-    args.files.iter().try_for_each(|path| write(args, path, (&a, &b), maps.as_ref()))?;
+    // A limit on what these pictures have not is refused: before anything is written.
     let failures = args.limits.of_pictures(&report)?;
+    difference::write(args, (&a, &b), maps.as_ref())?;
     finish(args, Found::Pictures(&report), failures, || table::pictures(&report))
 }
 
@@ -208,41 +209,6 @@ fn finish(args: &CompareArgs, found: Found<'_>, failures: Vec<String>, text: imp
         to_stdout(&text())?;
     }
     failed.map_or(Ok(()), Err)
-}
-
-fn write(args: &CompareArgs, path: &Path, (a, b): (&Picture, &Picture), maps: Option<&Maps>) -> Result<()> {
-    match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
-        Some("exr") => {
-            let film = pictures::difference_film(a, b, maps)?;
-            let info = ImageInfo {
-                software: format!("lanecast {}", env!("CARGO_PKG_VERSION")),
-                revision: REVISION.into(),
-                ..Default::default()
-            };
-            exr::write(path, &film, &info, Compression::Zip)
-        }
-        Some("png") => {
-            let maps =
-                maps.ok_or_else(|| Error::Usage("-o: the pictures have no colours to make a heat map of".into()))?;
-            let levels: Vec<f32>;
-            let (values, whole) = match args.map.unwrap_or(Map::Flip) {
-                Map::Flip => (&maps.flip.values, Some(1.0)),
-                Map::HdrFlip => {
-                    let hdr = maps.hdr_flip.as_ref();
-                    let missing = || Error::Usage("--map hdr-flip: both pictures must hold linear light".into());
-                    (&hdr.ok_or_else(missing)?.values, Some(1.0))
-                }
-                Map::Error => (&maps.error, None),
-                Map::Levels => {
-                    levels = maps.levels.iter().map(|&l| f32::from(l)).collect();
-                    (&levels, None)
-                }
-            };
-            let full = args.full.or(whole).unwrap_or_else(|| heat::quantile(values, 0.999));
-            heat::write_png(path, a.film.window, values, full)
-        }
-        _ => Err(Error::Usage(format!("-o {}: expected a name that ends in .exr or .png", path.display()))),
-    }
 }
 
 impl Limits {
