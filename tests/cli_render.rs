@@ -137,8 +137,6 @@ fn scenes_without_anything_are_pictures() {
     assert!(bytes.len() == 40 * 30 * 3 && bytes.chunks_exact(3).all(|pixel| pixel == [0, 0, 1]));
 }
 
-/// Half of what shines and half of the black behind it: by every engine, also by one whose arithmetic hangs on which rays go together, and
-/// whatever planes are asked for beside.
 /// Light goes through two faces of a box, however thin it is and from however far it is seen.
 #[test]
 fn thin_boxes_have_two_faces() {
@@ -158,6 +156,8 @@ fn thin_boxes_have_two_faces() {
     }
 }
 
+/// Half of what shines and half of the black behind it: by every engine, also by one whose arithmetic hangs on which rays go together, and
+/// whatever planes are asked for beside.
 #[test]
 fn half_opaque_surfaces_are_half_seen() {
     let dir = tempfile::tempdir().expect("a temporary folder");
