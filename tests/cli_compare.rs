@@ -163,6 +163,31 @@ fn what_does_not_compare_is_refused() {
     assert!(sizes.code == Some(1) && sizes.err.contains("16x12 and 3x3"), "{}", sizes.err);
 }
 
+/// Options of scenes, of files without a size and of heat maps mean nothing to other pictures, which need not be opened for that.
+#[test]
+fn options_without_effect_on_pictures_are_refused() {
+    let dir = folder();
+    for option in [
+        "--set q=1",
+        "--top foo",
+        "--precision f64",
+        "--preset best",
+        "--leaf 4",
+        "--lenient",
+        "--size 3x3",
+        "--map error",
+        "--full 2",
+        "--map error -o d.exr",
+    ] {
+        let line = format!("compare none.exr none.png {option}");
+        let words: Vec<&str> = line.split(' ').collect();
+        refused(dir.path(), &words, &format!("error: {} is for ", words[3]));
+    }
+    run(&dir, "compare half.exr quarter.exr -o d.png --map error --full 2", 0);
+    run(&dir, "render builtin:die -o a.pix --size 8x4", 0);
+    run(&dir, "compare a.pix a.pix --size 8x4 --max-rmse 0", 0);
+}
+
 /// Rays down on a square: hits at t = 1, a miss beside it.
 #[test]
 fn hits_are_judged_by_the_oracle() {
@@ -195,6 +220,11 @@ fn hits_are_judged_by_the_oracle() {
     refused(at, &["compare", "a.npy", "rays.npy"], "hits");
     refused(at, &["compare", "a.npy", "b.npy", "-o", "d.exr"], "no pixels");
     refused(at, &["compare", "a.npy", "b.npy", "--max-rmse", "1"], "--max-beyond");
+    for option in ["--set q=1", "--precision f64"] {
+        let line = format!("compare a.npy b.npy {option}");
+        let words: Vec<&str> = line.split(' ').collect();
+        refused(at, &words, &format!("{} says how to open a scene: expected --scene and --rays", words[3]));
+    }
     for option in ["--map flip", "--full 1", "--exposure 0", "--peak 1", "--size 4x4", "--ppd 60"] {
         let line = format!("compare a.npy b.npy {option}");
         let words: Vec<&str> = line.split(' ').collect();

@@ -245,6 +245,10 @@ fn options_without_effect_are_refused() {
         }
     }
     refused(dir.path(), &["bench", "--turns", "5"], "--against");
+    for peers in ["", " --peers obvhs", " --against none"] {
+        let line = format!("bench none.ply --embree x.so{peers}");
+        refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), "--embree: expected embree or embree-robust");
+    }
     refused(dir.path(), &["report", ".", "--readme", "text.md", "-o", "page.html"], "--output");
 }
 

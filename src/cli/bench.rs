@@ -136,6 +136,15 @@ pub struct BenchArgs {
 }
 
 impl BenchArgs {
+    /// Checks that the library that is given has a peer to run.
+    fn check_embree(&self) -> Result<()> {
+        let is_used = self.peers.iter().any(|name| name.starts_with("embree"));
+        if self.embree.is_some() && !is_used {
+            return Err(Error::Usage("--embree: expected embree or embree-robust among --peers".into()));
+        }
+        Ok(())
+    }
+
     fn invitation(&self) -> Invitation {
         Invitation { names: self.peers.clone(), embree: self.embree.clone() }
     }
@@ -160,6 +169,7 @@ pub fn run(args: &BenchArgs) -> Result<()> {
     if let Some(file) = &args.experiment {
         return experiment::run(file, args.folder.as_deref(), args.embree.as_deref(), &args.output);
     }
+    args.check_embree()?;
     args.folder.iter().chain(&args.record).try_for_each(|folder| check_folder(folder))?;
     if let Some(other) = &args.against {
         let (_dropped_at_the_end, temporary) = against::temporary()?;

@@ -17,6 +17,10 @@ pub use super::view::{CameraArgs, size};
 /// Engine of commands that are not told one.
 const DEFAULT_ENGINE: &str = "auto";
 
+/// How trees are built unless `--preset` and `--leaf` say otherwise.
+const DEFAULT_PRESET: PresetArg = PresetArg::Balanced;
+const DEFAULT_LEAF: u8 = 8;
+
 /// Which engine traces.
 #[derive(Clone, Debug, clap::Args)]
 pub struct EngineArgs {
@@ -83,10 +87,10 @@ pub struct SceneOptions {
     #[arg(long, help_heading = "Scene")]
     pub apart: bool,
     /// Time the build may take: how good the tree gets
-    #[arg(long, value_enum, default_value_t = PresetArg::Balanced, help_heading = "Scene")]
+    #[arg(long, value_enum, default_value_t = DEFAULT_PRESET, help_heading = "Scene")]
     pub preset: PresetArg,
     /// Most primitives in a leaf of the tree, 1 to 8
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..=8), help_heading = "Scene")]
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_LEAF, value_parser = clap::value_parser!(u8).range(1..=8), help_heading = "Scene")]
     pub leaf: u8,
     /// Arithmetic of the engines [default: what the scene asks for, else f32]
     #[arg(long, value_enum, help_heading = "Scene")]
@@ -163,6 +167,21 @@ impl SceneOptions {
         let brlcad = Options { tops: self.top.clone(), lenient: self.lenient };
         let (set, allow_outside, apart) = (self.set.clone(), self.allow_outside, self.apart);
         load_with(scene, &LoadOptions { set, brlcad, allow_outside, apart }, read)
+    }
+
+    /// The first of these options that asks for something: for commands that open no scene after all.
+    pub fn first_given(&self) -> Option<&'static str> {
+        let options = [
+            (!self.set.is_empty(), "--set"),
+            (self.allow_outside, "--allow-outside"),
+            (!self.top.is_empty(), "--top"),
+            (self.lenient, "--lenient"),
+            (self.apart, "--apart"),
+            (self.preset != DEFAULT_PRESET, "--preset"),
+            (self.leaf != DEFAULT_LEAF, "--leaf"),
+            (self.precision.is_some(), "--precision"),
+        ];
+        options.iter().find(|(is_given, _)| *is_given).map(|(_, name)| *name)
     }
 
     /// The precision asked for here, else by the scene, else f32.

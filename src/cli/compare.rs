@@ -2,6 +2,7 @@
 
 mod difference;
 mod table;
+mod usage;
 
 use std::path::{Path, PathBuf};
 
@@ -161,10 +162,7 @@ fn answers(path: &Path) -> Result<Option<FileAnswers>> {
 }
 
 fn images(args: &CompareArgs) -> Result<()> {
-    if args.scene.is_some() {
-        return Err(Error::Usage("--scene and --rays are for files of hits".into()));
-    }
-    args.files.iter().try_for_each(|file| difference::kind(file).map(drop))?;
+    args.check_for_pictures()?;
     args.files.iter().try_for_each(|file| check_file(file).and_then(|()| check_apart(file, &[&args.a, &args.b])))?;
     check_distinct(&args.files)?;
     let (a, b) = (picture::read(&args.a, args.size)?, picture::read(&args.b, args.size)?);
@@ -178,20 +176,7 @@ fn images(args: &CompareArgs) -> Result<()> {
 }
 
 fn hits(args: &CompareArgs, a: &FileAnswers, b: &FileAnswers) -> Result<()> {
-    if !args.files.is_empty() {
-        return Err(Error::Usage("-o: hits have no pixels; only pictures make difference images".into()));
-    }
-    let of_pictures = [
-        (args.map.is_some(), "--map"),
-        (args.full.is_some(), "--full"),
-        (args.exposure.is_some(), "--exposure"),
-        (args.peak.is_some(), "--peak"),
-        (args.size.is_some(), "--size"),
-        (args.ppd.is_some(), "--ppd"),
-    ];
-    if let Some((_, name)) = of_pictures.iter().find(|(is_given, _)| *is_given) {
-        return Err(Error::Usage(format!("{name} is for pictures; these are files of hits")));
-    }
+    args.check_for_hits()?;
     let mut report = hitfiles::compare(a, b)?;
     if let (Some(scene), Some(rays)) = (&args.scene, &args.rays) {
         let description = args.options.load(scene, &args.output)?;
