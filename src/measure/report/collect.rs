@@ -1,6 +1,6 @@
 //! What a folder of results holds: rows, facts about machines, pictures.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
@@ -25,7 +25,24 @@ pub struct Found {
     pub rows: Vec<Row>,
     /// Pictures, by path.
     pub pictures: Vec<PathBuf>,
+    /// Whether its rows are of more than one machine or build, so that figures have to say which.
+    several: bool,
 }
+
+impl Found {
+    /// What the row was measured on, as the end of a title; empty if that is so of all rows.
+    pub fn on(&self, row: &Row) -> String {
+        if !self.several {
+            return String::new();
+        }
+        let [cpu, isa, machine] = BUILD.map(|column| row.text(column));
+        let machine = if machine.is_empty() { String::new() } else { format!(" ({machine})") };
+        format!(" on {cpu}{machine} built for {isa}")
+    }
+}
+
+/// Columns that must be the same for two rates to compare: a CPU's name alone does not say which machine it is.
+const BUILD: [&str; 3] = ["cpu", "isa", "machine"];
 
 /// One result file.
 #[derive(Debug)]
@@ -36,10 +53,13 @@ pub struct Run {
     pub date: String,
     /// Lines of the file of facts beside it, name and value.
     pub facts: Vec<(String, String)>,
+    /// The same for runs that belong together: the steps of one experiment, or a day's runs in folders beside each other.
+    pub sitting: String,
 }
 
 /// One row, by column. Besides the file's columns there are `preset`, `leaf` and `set`: what its command says of them, empty
-/// if it says nothing.
+/// if it says nothing; and `machine`: which machine it is among those whose CPU has the same name, as far as the folder and the
+/// file of facts tell.
 #[derive(Debug)]
 pub struct Row {
     /// Which of the runs.
@@ -125,15 +145,52 @@ pub fn collect(folder: &Path) -> Result<Found> {
         let run = found.runs.len();
         let place =
             path.parent().and_then(|p| p.strip_prefix(folder).ok()).map_or(".".into(), |p| p.display().to_string());
-        let place = if place.is_empty() { ".".into() } else { place };
         let date = rows.first().and_then(|row| row.get("date")).cloned().unwrap_or_default();
-        found.runs.push(Run { place, date, facts: facts(&path.with_file_name("bench.env.txt")) });
-        found.rows.extend(rows.into_iter().map(|cells| Row { run, cells: with_options(cells) }));
+        let (facts, sitting) = (facts(&path.with_file_name("bench.env.txt")), sitting(folder, path, &date));
+        let machine = machine(Path::new(&place), &facts);
+        let place = if place.is_empty() { ".".into() } else { place };
+        found.runs.push(Run { place, date, facts, sitting });
+        found.rows.extend(rows.into_iter().map(|mut cells| {
+            cells.insert("machine".into(), machine.clone());
+            Row { run, cells: with_options(cells) }
+        }));
         if found.rows.len() > MAX_ROWS {
             return Err(Error::whole(folder, format!("expected at most {MAX_ROWS} rows of results")));
         }
     }
+    found.several =
+        found.rows.iter().map(|row| BUILD.map(|column| row.text(column))).collect::<BTreeSet<_>>().len() > 1;
     Ok(found)
+}
+
+/// The folder of the machine in a history (`MACHINE/DATE-REVISION/SCENE`, as `bench --record` keeps it), and the CPU's family and
+/// model: virtual machines of different kinds may call their CPU by one name.
+fn machine(place: &Path, facts: &[(String, String)]) -> String {
+    let words: Vec<String> = place.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+    let dated = words.iter().position(|word| is_dated(word)).unwrap_or(0);
+    let fact = |name: &str| facts.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str());
+    let kind = fact("cpu family").zip(fact("cpu model number"));
+    let kind = kind.map(|(family, model)| format!("family {family}, model {model}"));
+    let folder = Some(words[..dated].join("/")).filter(|folder| !folder.is_empty());
+    folder.into_iter().chain(kind).collect::<Vec<_>>().join(", ")
+}
+
+/// Whether a folder's name begins with a day: `2026-01-31-`.
+fn is_dated(name: &str) -> bool {
+    let fits = |(i, c): (usize, u8)| if [4, 7, 10].contains(&i) { c == b'-' } else { c.is_ascii_digit() };
+    name.len() > 10 && name.bytes().take(11).enumerate().all(fits)
+}
+
+/// See [`Run::sitting`]; `path` is the file of rows.
+fn sitting(folder: &Path, path: &Path, date: &str) -> String {
+    let above = |path: &Path| path.strip_prefix(folder).map_or(String::new(), |p| p.display().to_string());
+    let own = path.parent().unwrap_or(folder);
+    // `bench --experiment` leaves its file above its steps, each of which has a folder of its own.
+    let mut inside = own.ancestors().take_while(|ancestor| ancestor.starts_with(folder));
+    match inside.find(|ancestor| ancestor.join("experiment.kdl").is_file()) {
+        Some(experiment) => format!("experiment {}", above(experiment)),
+        None => format!("{} {}", date.get(..10).unwrap_or_default(), own.parent().map_or(String::new(), above)),
+    }
 }
 
 /// Adds what the command says.
@@ -210,4 +267,75 @@ fn facts(path: &Path) -> Vec<(String, String)> {
     let small = std::fs::metadata(path).is_ok_and(|meta| meta.is_file() && meta.len() < 1 << 20);
     let text = if small { std::fs::read_to_string(path).unwrap_or_default() } else { String::new() };
     text.lines().filter_map(|line| line.split_once(": ")).map(|(n, v)| (n.to_string(), v.to_string())).collect()
+}
+
+#[cfg(test)]
+pub mod samples {
+    use super::*;
+
+    const COLUMNS: &str = "revision,date,cpu,isa,threads,scene,scene_hash,prims,class,engine,precision,rays,status,\
+                           median_mrays_per_s,ratio_to_scalar,mad_seconds,repeat,command";
+
+    /// A row of `tile`; `command` is what follows the scene.
+    pub struct Sample {
+        pub revision: &'static str,
+        pub day: &'static str,
+        pub isa: &'static str,
+        pub threads: u32,
+        pub prims: u32,
+        pub class: &'static str,
+        pub rate: f64,
+        pub command: &'static str,
+    }
+
+    /// One thread of an AVX-512 build.
+    pub const SAMPLE: Sample = Sample {
+        revision: "aaaaaaaaaaaa",
+        day: "2026-01-01",
+        isa: "avx512",
+        threads: 1,
+        prims: 12,
+        class: "primary",
+        rate: 10.0,
+        command: "",
+    };
+
+    /// What is found where `place`s hold these rows, and files of facts that name the model of the CPU, if it is not 0. All CPUs
+    /// have the same name.
+    pub fn found(files: &[(&str, u32, &[Sample])]) -> Found {
+        let root = tempfile::tempdir().unwrap();
+        for (place, model, rows) in files {
+            let folder = root.path().join(place);
+            std::fs::create_dir_all(&folder).unwrap();
+            let mut text = format!("{COLUMNS}\n");
+            for Sample { revision, day, isa, threads, prims, class, rate, command } in *rows {
+                text.push_str(&format!(
+                    "{revision},{day}T00:00:00Z,A CPU,{isa},{threads},box,{prims:x},{prims},{class},tile,f32,"
+                ));
+                text.push_str(&format!("1000,ok,{rate},{rate},0.0,9,lanecast bench box{command}\n"));
+            }
+            std::fs::write(folder.join("bench.csv"), text).unwrap();
+            if *model != 0 {
+                let facts = format!("cpu: A CPU\ncpu family: 25\ncpu model number: {model}\n");
+                std::fs::write(folder.join("bench.env.txt"), facts).unwrap();
+            }
+            if let Some((experiment, _)) = place.split_once("/CASE") {
+                std::fs::write(root.path().join(experiment).join("experiment.kdl"), "").unwrap();
+            }
+        }
+        collect(root.path()).unwrap()
+    }
+
+    /// Titles of figures, and the cells of each line of their tables.
+    pub fn told(html: &str) -> (Vec<String>, Vec<String>) {
+        let between = |text: &str, end: &str| text.split(end).next().unwrap_or_default().to_string();
+        let titles = html.split("<figcaption>").skip(1).map(|text| between(text, "</figcaption>"));
+        let cells = |line: &str| {
+            let cells = line.split("<td").skip(1).filter_map(|cell| Some(between(cell.split_once('>')?.1, "</td>")));
+            cells.collect::<Vec<_>>().join("|")
+        };
+        let lines =
+            html.split("<tr>").skip(1).map(|line| cells(&between(line, "</tr>"))).filter(|line| !line.is_empty());
+        (titles.collect(), lines.collect())
+    }
 }

@@ -40,7 +40,7 @@ fn row(scene: &str, prims: u64, engine: &'static str, seconds: f64) -> Row {
 
 fn run(folder: &Path, revision: &'static str, threads: usize, rows: &[Row]) {
     std::fs::create_dir_all(folder).unwrap();
-    let (date, cpu) = (format!("2026-01-0{threads}T00:00:00Z"), "A <fast> CPU".to_string());
+    let (date, cpu) = (format!("2026-01-01T0{threads}:00:00Z"), "A <fast> CPU".to_string());
     let command = format!("lanecast bench 'a & b.ply' --threads {threads}");
     let run = Run { date, revision, isa: "avx2", flags: "", rustc: "", cpu, threads, command };
     let rows: Vec<Row> = rows.iter().map(|row| Row { threads, ..row.clone() }).collect();
