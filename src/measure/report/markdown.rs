@@ -177,10 +177,20 @@ impl Wanted {
             let values: BTreeSet<&str> = rows.iter().map(|row| row.text(column)).collect();
             values.into_iter().map(grouped).collect::<Vec<_>>().join(" or ")
         };
+        // Cells are of the newest run of each; a CPU's name does not say whether all are of one machine.
+        let machines: BTreeSet<[&str; 2]> = rows.iter().map(|row| [row.text("cpu"), row.text("machine")]).collect();
+        let cpus = if machines.len() > 1 {
+            let told = |[cpu, machine]: &[&str; 2]| match *machine {
+                "" => cpu.to_string(),
+                machine => format!("{cpu} ({machine})"),
+            };
+            machines.iter().map(told).collect::<Vec<_>>().join(" or ")
+        } else {
+            all("cpu")
+        };
         let threads = if self.threads == "1" { "One thread".into() } else { format!("{} threads", self.threads) };
         let mut text = format!(
-            "{threads} of {}, built for {}; {} rays of each class in {}; million rays per second, medians of {} interleaved rounds",
-            all("cpu"),
+            "{threads} of {cpus}, built for {}; {} rays of each class in {}; million rays per second, medians of {} interleaved rounds",
             all("isa"),
             all("rays"),
             self.precision,
@@ -301,4 +311,22 @@ fn wrapped(text: &str) -> String {
     }
     lines.push('\n');
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::collect::samples::{SAMPLE, Sample, found};
+    use super::*;
+
+    #[test]
+    fn machines_whose_cpus_have_one_name_are_told_apart() {
+        let text = "<!-- figures\nscenes: box\nengines: tile\n-->\n<!-- end of figures -->\n";
+        let made = |models: [u32; 2]| {
+            let found = found(&[("a", models[0], &[SAMPLE]), ("b", models[1], &[Sample { class: "ao", ..SAMPLE }])]);
+            fill(text, Path::new("README.md"), &found).unwrap().0.split_whitespace().collect::<Vec<_>>().join(" ")
+        };
+        let two = "One thread of A CPU (family 25, model 17) or A CPU (family 25, model 2), built for avx512;";
+        assert!(made([17, 2]).contains(two), "{}", made([17, 2]));
+        assert!(made([17, 17]).contains("One thread of A CPU, built for avx512;"), "{}", made([17, 17]));
+    }
 }

@@ -52,8 +52,18 @@ pub fn page(title: &str, options: &Options, found: &Found, sections: Vec<Section
 }
 
 /// Facts that are worth a row in the summary of machines.
-const SHOWN: [&str; 8] =
-    ["cpu", "cores available", "isa compiled", "rustc", "rustflags", "profile", "threads", "governor"];
+const SHOWN: [&str; 10] = [
+    "cpu",
+    "cpu family",
+    "cpu model number",
+    "cores available",
+    "isa compiled",
+    "rustc",
+    "rustflags",
+    "profile",
+    "threads",
+    "governor",
+];
 
 /// Most runs whose facts are told in full.
 const MOST_FACTS: usize = 12;

@@ -5,16 +5,17 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 
 use super::collect::{Found, Row};
-use super::figures::{Section, figure, number, percent, table, with_interval};
+use super::figures::{Section, figure, made, number, percent, table, with_interval};
 use super::plot::{Bar, bars};
 use crate::measure::intervals::{Estimate, Interval};
 
 /// What distinguishes one figure from another.
-const FIGURE: [&str; 8] = ["scene", "precision", "threads", "rays", "preset", "leaf", "set", "scene_hash"];
+const FIGURE: [&str; 11] =
+    ["scene", "precision", "threads", "rays", "preset", "leaf", "set", "cpu", "isa", "machine", "scene_hash"];
 
-/// Rows of each figure: of every scene and setting, and every ray class, those of the newest run, in written order.
+/// Rows of each figure: of every scene, setting and machine, and every ray class, those of the newest run, in written order.
 fn newest(found: &Found) -> Vec<(String, Vec<&Row>)> {
-    let mut groups: BTreeMap<[String; 8], Vec<&Row>> = BTreeMap::new();
+    let mut groups: BTreeMap<[String; 11], Vec<&Row>> = BTreeMap::new();
     for row in &found.rows {
         groups.entry(row.key(FIGURE)).or_default().push(row);
     }
@@ -26,13 +27,11 @@ fn newest(found: &Found) -> Vec<(String, Vec<&Row>)> {
         }
         let is_last = |row: &&Row| row.is_quoted() && last.get(row.text("class")) == Some(&row.run);
         let rows: Vec<&Row> = rows.iter().copied().filter(is_last).collect();
-        let [scene, precision, threads, rays, preset, leaf, set, _] = key;
+        let [scene, precision, threads, rays, ..] = key;
         let prims = rows.first().map_or("", |row| row.text("prims"));
         let plural = if threads == "1" { "" } else { "s" };
-        let preset = if preset.is_empty() { preset } else { format!(", preset {preset}") };
-        let leaf = if leaf.is_empty() { leaf } else { format!(", leaves of up to {leaf}") };
-        let set = if set.is_empty() { set } else { format!(", {set}") };
-        let how = format!("{rays} rays, {precision}, {threads} thread{plural}{preset}{leaf}{set}");
+        let (made, on) = rows.first().map_or_else(Default::default, |row| (made(row, ""), found.on(row)));
+        let how = format!("{rays} rays, {precision}, {threads} thread{plural}{made}{on}");
         (format!("{scene}: {prims} primitives, {how}"), rows)
     });
     figures.collect()
@@ -160,4 +159,23 @@ pub fn accuracy(found: &Found) -> Option<Section> {
     };
     Some(Section { id: "accuracy", title: "Accuracy", figures: figures.len(), pairs: 0, body })
         .filter(|s| s.figures > 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::collect::samples::{SAMPLE, Sample, found, told};
+    use super::*;
+
+    #[test]
+    fn machines_and_builds_have_figures_of_their_own() {
+        let later = Sample { day: "2026-01-02", rate: 20.0, ..SAMPLE };
+        let narrow = Sample { isa: "avx2", rate: 5.0, ..later };
+        let found = found(&[("a", 17, &[SAMPLE]), ("b", 17, &[later]), ("c", 2, &[SAMPLE]), ("d", 17, &[narrow])]);
+        let (titles, lines) = told(&section(&found).unwrap().body.into_string());
+        let title = |on: &str| format!("box: 12 primitives, 1000 rays, f32, 1 thread on A CPU (family 25, model {on}");
+        assert_eq!(titles, ["17) built for avx2", "17) built for avx512", "2) built for avx512"].map(title));
+        // Of each the newest run.
+        let rates: Vec<&str> = lines.iter().filter_map(|line| line.split(['|', '(']).nth(2)).collect();
+        assert_eq!(rates, ["5.00 ", "20.00 ", "10.00 "], "{lines:?}");
+    }
 }
