@@ -12,9 +12,9 @@ pub fn table(rows: &[Row]) -> String {
     let mut counts: Vec<usize> = rows.iter().filter(measured).map(|row| row.threads).collect();
     counts.sort_unstable();
     counts.dedup();
-    let same = |a: &Row, b: &Row| {
-        (&a.scene.hash, a.class, a.engine, a.precision) == (&b.scene.hash, b.class, b.engine, b.precision)
-    };
+    // Two scenes may have one hash (the same file under two names), but never one name.
+    let key = |row: &Row| (row.class, row.engine, row.precision);
+    let same = |a: &Row, b: &Row| key(a) == key(b) && (&a.scene.hash, &a.scene.name) == (&b.scene.hash, &b.scene.name);
     let most = counts.last().copied().unwrap_or(0);
     let width = rows.iter().map(|row| row.engine.len()).max().unwrap_or(0).max("engine".len());
     let mut scene = None;
@@ -101,5 +101,21 @@ mod tests {
         assert_eq!(lines[4], ["primary", "stream", "-", "-", "3.00", "100%"]);
         assert_eq!(lines.len(), 6, "{text}");
         assert_eq!(table(&[row("tile", 2, 0.5, None)]), "");
+    }
+
+    #[test]
+    fn scenes_of_one_hash_have_rates_of_their_own() {
+        let named = |name: &str, threads, seconds| {
+            let scene = SceneFacts { name: name.into(), hash: "00ff".into(), ..Default::default() };
+            Row { scene, ..row("scalar", threads, seconds, Some(1.0)) }
+        };
+        let rows = [named("m", 2, 1.5), named("m", 1, 3.0), named("m-2", 2, 0.5), named("m-2", 1, 1.0)];
+        let text = table(&rows);
+        let rates: Vec<Vec<&str>> = text
+            .lines()
+            .filter(|line| line.contains("scalar"))
+            .map(|line| line.split_whitespace().skip(2).step_by(2).collect())
+            .collect();
+        assert_eq!(rates, [["1.00", "2.00"], ["3.00", "6.00"]], "{text}");
     }
 }
