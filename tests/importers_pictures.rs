@@ -98,6 +98,37 @@ fn pictures_of_floats() {
     assert!(texels[0][0] > 1e9 && texels[0][0].is_finite());
 }
 
+/// A Radiance picture of one texel of 1, 1, 1 with `lines` in its header.
+fn hdr_file(signature: &str, lines: &str) -> Vec<u8> {
+    let mut bytes = format!("{signature}\n{lines}FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n").into_bytes();
+    bytes.extend([128, 128, 128, 129]);
+    bytes
+}
+
+#[test]
+fn exposure_of_radiance_pictures_is_divided_out() {
+    for (lines, wanted) in [
+        ("", [1.0; 4]),
+        ("EXPOSURE=4\n", [0.25, 0.25, 0.25, 1.0]),
+        ("EXPOSURE=4\nSOFTWARE=x\nEXPOSURE= 0.5\n", [0.5, 0.5, 0.5, 1.0]),
+        ("COLORCORR=2 1 0.5\nEXPOSURE=2\n", [0.25, 0.5, 1.0, 1.0]),
+    ] {
+        let read = decode("t.hdr", &hdr_file("#?RADIANCE", lines), Curve::Linear).unwrap();
+        assert_eq!(read.texels, Texels::Float(vec![wanted]), "{lines}");
+    }
+    for (lines, wanted) in [
+        ("EXPOSURE=0\n", "expected a finite EXPOSURE above zero, found 0"),
+        ("EXPOSURE=-1\n", "expected a finite EXPOSURE above zero, found -1"),
+        ("EXPOSURE=inf\n", "expected a finite EXPOSURE above zero, found inf"),
+        ("EXPOSURE=1e30\nEXPOSURE=1e30\n", "expected a finite EXPOSURE above zero, found inf"),
+        ("COLORCORR=1 nan 1\n", "expected a finite COLORCORR above zero, found NaN"),
+        ("COLORCORR=1 1 1e30\nEXPOSURE=1e30\n", "EXPOSURE and COLORCORR multiply to [1e30, 1e30, inf]"),
+    ] {
+        let error = decode("t.hdr", &hdr_file("#?RADIANCE", lines), Curve::Linear).unwrap_err();
+        assert!(error.contains(wanted), "{lines}: {error}");
+    }
+}
+
 fn exr_file(colour: impl Sync + Fn(usize, usize) -> (f32, f32, f32)) -> Vec<u8> {
     use exr::prelude::{Image, SpecificChannels, Vec2, WritableImage};
     let channels = SpecificChannels::rgb(|at: Vec2<usize>| colour(at.x(), at.y()));

@@ -2,7 +2,7 @@
 
 use image::{ColorType, ImageDecoder};
 
-use super::{Format, decoder, openexr, shortened};
+use super::{Format, decoder, openexr, radiance, shortened};
 use crate::scene::text;
 
 /// Most texels along a side.
@@ -46,7 +46,11 @@ impl Header {
                 let (width, height) = openexr::size(bytes).map_err(broken)?;
                 (width, height, size_of::<[f32; 4]>())
             }
-            _ => {
+            Format::Hdr => {
+                let (width, height) = radiance::size(bytes).map_err(broken)?;
+                (width, height, size_of::<[f32; 4]>())
+            }
+            Format::Png | Format::Jpeg => {
                 let decoder = decoder(format, bytes).map_err(broken)?;
                 let (width, height) = decoder.dimensions();
                 (width, height, texel_bytes(decoder.color_type()))
@@ -76,7 +80,6 @@ impl Header {
 /// Bytes of a texel of the kind that pixels of `kind` become.
 fn texel_bytes(kind: ColorType) -> usize {
     match kind {
-        ColorType::Rgb32F | ColorType::Rgba32F => size_of::<[f32; 4]>(),
         ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => size_of::<[u16; 4]>(),
         _ => size_of::<[u8; 4]>(),
     }

@@ -28,11 +28,6 @@ pub(super) fn texels(raw: Vec<u8>, kind: ColorType, curve: Curve) -> Result<Texe
         ColorType::La16 => sixteen::<2>(&raw, curve, |[l, a]| [l, l, l, a]),
         ColorType::Rgb16 => sixteen::<3>(&raw, curve, |[r, g, b]| [r, g, b, u16::MAX]),
         ColorType::Rgba16 => sixteen::<4>(&raw, curve, |p| p),
-        ColorType::Rgb32F => {
-            let number = |p: &[u8], i: usize| f32::from_ne_bytes([p[i], p[i + 1], p[i + 2], p[i + 3]]);
-            let pixels = raw.chunks_exact(12).map(|p| [0, 4, 8].map(|i| number(p, i)));
-            Texels::Float(pixels.map(|[r, g, b]| clean([r, g, b, 1.0])).collect())
-        }
         other => return Err(format!("pixels of the kind {other:?} are not read")),
     })
 }

@@ -1,7 +1,7 @@
 //! Pictures of scenes as textures: PNG, JPEG, Radiance HDR and OpenEXR, told apart by their first bytes.
 //!
 //! The crates `image` and `exr` decode; `header` decides from a picture's header whether it may be decoded, `levels`
-//! turns what comes out into texels, `openexr` reads EXR, `set` decodes many pictures on all threads.
+//! turns what comes out into texels, `openexr` reads EXR, `radiance` HDR, `set` decodes many pictures on all threads.
 //!
 //! Numbers are taken as the use asks ([`Curve`]); colour profiles and gamma of the file are not applied, as glTF 2.0
 //! (section 3.8.3) demands. Grey and palettes become R, G, B; no alpha is 1.
@@ -12,6 +12,7 @@
 mod header;
 mod levels;
 mod openexr;
+mod radiance;
 mod set;
 
 use std::io::Cursor;
@@ -72,7 +73,8 @@ pub fn decode(name: &str, bytes: &[u8], curve: Curve) -> Result<Texture, String>
     let broken = |what: String| format!("not a readable {} picture: {}", header.format.name(), shortened(&what));
     let texels = match header.format {
         Format::Exr => openexr::texels(bytes, &header).map_err(broken)?,
-        Format::Png | Format::Jpeg | Format::Hdr => {
+        Format::Hdr => radiance::texels(bytes, &header).map_err(broken)?,
+        Format::Png | Format::Jpeg => {
             let decoder = decoder(header.format, bytes).map_err(broken)?;
             let kind = decoder.color_type();
             // The header was compared with the bounds, so this is a size that was found harmless.
@@ -84,12 +86,11 @@ pub fn decode(name: &str, bytes: &[u8], curve: Curve) -> Result<Texture, String>
     Ok(Texture { name: name.to_owned(), width: header.width, height: header.height, texels })
 }
 
-/// The decoder of a picture in a format of the crate `image`, its header read.
+/// The decoder of a PNG or JPEG picture, its header read.
 fn decoder(format: Format, bytes: &[u8]) -> Result<impl ImageDecoder + '_, String> {
     let format = match format {
         Format::Png => ImageFormat::Png,
-        Format::Hdr => ImageFormat::Hdr,
-        Format::Jpeg | Format::Exr => ImageFormat::Jpeg,
+        _ => ImageFormat::Jpeg,
     };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::no_limits();
