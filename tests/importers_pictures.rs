@@ -115,6 +115,9 @@ fn exposure_of_radiance_pictures_is_divided_out() {
     ] {
         let read = decode("t.hdr", &hdr_file("#?RADIANCE", lines), Curve::Linear).unwrap();
         assert_eq!(read.texels, Texels::Float(vec![wanted]), "{lines}");
+        // The other signature of the same format.
+        let other = decode("t.hdr", &hdr_file("#?RGBE", lines), Curve::Linear).unwrap();
+        assert_eq!(other, read, "{lines}");
     }
     for (lines, wanted) in [
         ("EXPOSURE=0\n", "expected a finite EXPOSURE above zero, found 0"),

@@ -50,7 +50,7 @@ impl Format {
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some(Self::Png),
             [0xff, 0xd8, 0xff, ..] => Some(Self::Jpeg),
             [0x76, 0x2f, 0x31, 0x01, ..] => Some(Self::Exr),
-            _ => (bytes.starts_with(b"#?RADIANCE") || bytes.starts_with(b"#?RGBE")).then_some(Self::Hdr),
+            _ => radiance::is_known(bytes).then_some(Self::Hdr),
         }
     }
 

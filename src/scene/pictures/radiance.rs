@@ -3,7 +3,7 @@
 //! Source: G. Ward, "Radiance File Formats": `EXPOSURE` and `COLORCORR` say what the pixels were multiplied by; values
 //! of several lines are multiplied with each other.
 
-use std::io::Cursor;
+use std::io::Read;
 
 use image::ImageDecoder;
 use image::codecs::hdr::HdrDecoder;
@@ -11,6 +11,14 @@ use image::codecs::hdr::HdrDecoder;
 use super::header::Header;
 use super::levels::clean;
 use crate::scene::texture::Texels;
+
+/// Beginnings of such files, the usual one first.
+const SIGNATURES: [&[u8]; 2] = [b"#?RADIANCE", b"#?RGBE"];
+
+/// Whether `bytes` begin as such a picture does.
+pub(super) fn is_known(bytes: &[u8]) -> bool {
+    SIGNATURES.iter().any(|signature| bytes.starts_with(signature))
+}
 
 /// Width and height of the picture in `bytes`.
 ///
@@ -37,15 +45,17 @@ pub(super) fn texels(bytes: &[u8], header: &Header) -> Result<Texels, String> {
     Ok(Texels::Float(pixels.map(|[r, g, b]| clean([r, g, b, 1.0])).collect()))
 }
 
-fn open(bytes: &[u8]) -> Result<HdrDecoder<Cursor<&[u8]>>, String> {
-    HdrDecoder::new(Cursor::new(bytes)).map_err(|e| e.to_string())
+/// The decoder, its header read. It knows one signature only; some programs write the other, of the same format.
+fn open(bytes: &[u8]) -> Result<HdrDecoder<impl Read + '_>, String> {
+    let rest = SIGNATURES.iter().find_map(|signature| bytes.strip_prefix(*signature)).unwrap_or(bytes);
+    HdrDecoder::new(SIGNATURES[0].chain(rest)).map_err(|e| e.to_string())
 }
 
 /// What red, green and blue were multiplied by, all lines of the header together.
 ///
 /// # Errors
 /// Products by which nothing can be divided.
-fn multipliers<R: std::io::Read>(decoder: &HdrDecoder<R>) -> Result<[f32; 3], String> {
+fn multipliers<R: Read>(decoder: &HdrDecoder<R>) -> Result<[f32; 3], String> {
     let data = decoder.metadata();
     let exposure = data.exposure.unwrap_or(1.0);
     let (r, g, b) = data.color_correction.unwrap_or((1.0, 1.0, 1.0));
