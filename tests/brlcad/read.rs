@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use lanecast::error::{Error, Result};
+use lanecast::scene::brlcad::describe::{Options, describe};
 use lanecast::scene::brlcad::regions::{Regions, walk};
 use lanecast::scene::brlcad::{Database, ObjectKind, choose_tops, parse, tops};
 
@@ -299,6 +300,28 @@ fn hostile_depth_breadth_and_sharing_end_in_time() {
     assert!(regions(&text, "g").is_err(), "9 million leaves");
     println!("hostile trees: {:?}", start.elapsed());
     assert!(start.elapsed() < Duration::from_secs(60));
+}
+
+/// Seconds to read and describe a database of a ball and `count` regions of it, of which `region` says the rest.
+fn seconds(head: &str, count: usize, region: impl Fn(usize) -> String) -> f64 {
+    let mut text = format!("title {{t}}\nunits mm\n{head}put s ell V {{0 0 0}} A {{1 0 0}} B {{0 1 0}} C {{0 0 1}}\n");
+    (0..count).for_each(|i| text += &format!("put r{i} comb region yes id {i} {} tree {{l s}}\n", region(i)));
+    let start = Instant::now();
+    let description = describe(Path::new("d.asc"), "d", &read(&text).unwrap(), &Options::default()).unwrap();
+    assert_eq!(description.solids.len(), count);
+    start.elapsed().as_secs_f64()
+}
+
+/// Regions that all have a colour of their own take about as long as those that share one: a search through all of them for
+/// each would take ten times as long.
+#[test]
+fn very_many_colours_take_no_longer_than_few() {
+    const COUNT: usize = 60_000;
+    let own = |i: usize| format!("rgb {{{} {} {}}}", i & 255, i >> 8 & 255, i >> 16);
+    let shared = seconds("", COUNT, |_| own(0));
+    let distinct = seconds("", COUNT, own);
+    println!("one colour: {shared} s, {COUNT} colours: {distinct} s");
+    assert!(distinct < 4.0 * shared + 1.0, "{distinct} s against {shared} s");
 }
 
 /// Reads mutated seeds of the fuzz corpus: an error with a place, or a database that can be walked; never a panic.

@@ -1,5 +1,6 @@
 //! A database's regions as a scene: one tree of solids for each, in BRL-CAD's order, with colour and shader.
 
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -75,7 +76,7 @@ pub fn describe(file: &Path, name: &str, database: &Database, options: &Options)
     let mut description = Description::new(name);
     description.precision = Some(Precision::F64);
     description.warnings.clone_from(&database.warnings);
-    let mut looks = Looks::default();
+    let (mut looks, mut materials) = (Looks::default(), Materials::new());
     for region in &found.regions {
         let shader = region.shader.and_then(|object| shader_of(database, object));
         if let Some(surroundings) = shader.as_ref().filter(|shader| shader.name == "envmap") {
@@ -83,7 +84,14 @@ pub fn describe(file: &Path, name: &str, database: &Database, options: &Options)
             continue;
         }
         let tree = region_tree(database, region, &mut found.problems);
-        add_region(&mut description, database, region, tree, shader, &mut looks);
+        let kind = ItemKind::Solids(description.solids.len() as u32);
+        description.solids.push(Arc::new(tree));
+        let material = material(&mut description, &mut materials, region.color);
+        description.groups[0].items.push(Item { transform: DAffine3::IDENTITY, material, kind });
+        let look = look(database, region, shader);
+        let all = [looks.bounds, look.bounds].into_iter().flatten();
+        looks.bounds = all.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        looks.regions.push(look);
     }
     if found.air > 0 {
         description.warnings.push(format!("{} regions of air are left out", found.air));
@@ -101,20 +109,8 @@ fn shader_of(database: &Database, object: u32) -> Option<Shader> {
     }
 }
 
-/// One region as an item, with its material and its look.
-fn add_region(
-    description: &mut Description,
-    database: &Database,
-    region: &PlacedRegion,
-    tree: SolidTree,
-    shader: Option<Shader>,
-    looks: &mut Looks,
-) {
-    let index = description.solids.len() as u32;
-    description.solids.push(Arc::new(tree));
-    let material = material(description, region.color);
-    let kind = ItemKind::Solids(index);
-    description.groups[0].items.push(Item { transform: DAffine3::IDENTITY, material, kind });
+/// How a region looks.
+fn look(database: &Database, region: &PlacedRegion, shader: Option<Shader>) -> Look {
     let object = |i: usize| Some(&database.objects[region.solids.get(i)?.object as usize].kind);
     let solid = |i: usize| match object(i)? {
         ObjectKind::Solid(solid) => Some(solid),
@@ -129,9 +125,7 @@ fn add_region(
         ([only], Some(Solid::Arb { points })) => Some(Box::new(points.map(|p| only.transform.transform_point3(p)))),
         _ => None,
     };
-    let all = [looks.bounds, bounds].into_iter().flatten();
-    looks.bounds = all.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-    looks.regions.push(Look {
+    Look {
         path: region.path.clone(),
         id: region.region.id,
         color: region.color,
@@ -140,19 +134,21 @@ fn add_region(
         bounds,
         arb,
         place: region.solids.first().map_or(DAffine3::IDENTITY, |solid| solid.transform),
-    });
+    }
 }
 
-/// The material of a colour: databases use few.
-fn material(description: &mut Description, color: Option<DVec3>) -> Option<MaterialId> {
+/// Materials by the bits of their colours: each region of a large database may have one of its own.
+type Materials = HashMap<[u64; 3], MaterialId>;
+
+/// The material of a colour; `known` are those of this database.
+fn material(description: &mut Description, known: &mut Materials, color: Option<DVec3>) -> Option<MaterialId> {
     let diffuse = color?;
-    let known = description.materials.iter().skip(1).position(|material| material.diffuse == diffuse);
-    let id = known.map_or(description.materials.len(), |i| i + 1);
-    if known.is_none() {
+    let id = *known.entry(diffuse.to_array().map(f64::to_bits)).or_insert_with(|| {
         let name = format!("color {:.0}/{:.0}/{:.0}", diffuse.x * 255.0, diffuse.y * 255.0, diffuse.z * 255.0);
         description.materials.push(Material { name, diffuse, ..Material::default() });
-    }
-    Some(id as MaterialId)
+        description.materials.len() as MaterialId - 1
+    });
+    Some(id)
 }
 
 /// The region's expression over its solids; what cannot be built counts as empty and is a problem.
