@@ -324,6 +324,19 @@ fn very_many_colours_take_no_longer_than_few() {
     assert!(distinct < 4.0 * shared + 1.0, "{distinct} s against {shared} s");
 }
 
+/// The same with a table of colours by region number, of as many entries.
+#[test]
+fn a_long_table_of_colours_takes_no_longer_than_a_short_one() {
+    const COUNT: usize = 60_000;
+    // The entry for all comes first: each region that has none of its own would search to the end of the list.
+    let short = "color 0 1000000 1 2 3\n";
+    let long = (0..COUNT).fold(short.to_owned(), |text, i| text + &format!("color {0} {0} 4 5 6\n", i + 500_000));
+    let short = seconds(short, COUNT, |_| String::new());
+    let long = seconds(&long, COUNT, |_| String::new());
+    println!("one entry: {short} s, {COUNT} entries: {long} s");
+    assert!(long < 4.0 * short + 1.0, "{long} s against {short} s");
+}
+
 /// Reads mutated seeds of the fuzz corpus: an error with a place, or a database that can be walked; never a panic.
 #[test]
 fn mutations_never_panic() {

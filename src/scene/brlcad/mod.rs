@@ -12,6 +12,7 @@ mod binary;
 mod boolean;
 mod bot;
 mod boxes;
+mod colors;
 pub mod describe;
 mod lines;
 mod lower;

@@ -131,7 +131,7 @@ impl Database {
         self.index.get(name).copied()
     }
 
-    /// Colour that the table gives to region number `id`.
+    /// Colour that the table gives to region number `id`: looks through all of it.
     pub fn color_of(&self, id: i32) -> Option<[u8; 3]> {
         self.colors.iter().rev().find(|range| (range.low..=range.high).contains(&id)).map(|range| range.rgb)
     }

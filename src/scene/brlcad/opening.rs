@@ -36,7 +36,7 @@ impl Walk<'_> {
         let channel = |c: u8| f64::from(c);
         let own = leaf.state.color.map(|rgb| DVec3::from(rgb.map(channel)) / 255.0);
         // BRL-CAD rounds the table's bytes, and only those, to the middle of their step.
-        let listed = || self.database.color_of(leaf.region.id).map(|rgb| (DVec3::from(rgb.map(channel)) + 0.5) / 255.0);
+        let listed = || self.colors.color_of(leaf.region.id).map(|rgb| (DVec3::from(rgb.map(channel)) + 0.5) / 255.0);
         Ok(Some(PlacedRegion {
             path: self.path(leaf.path),
             region: leaf.region,

@@ -11,6 +11,7 @@ use std::path::Path;
 use glam::{DAffine3, DVec3};
 
 use super::boolean::{Expression, Step};
+use super::colors::ColorTable;
 use super::model::{Combination, Database, ObjectKind, Region, short};
 use crate::error::{Error, Place, Result};
 
@@ -118,6 +119,8 @@ struct Frame {
 pub(super) struct Walk<'a> {
     pub file: &'a Path,
     pub database: &'a Database,
+    /// Its region colour table.
+    pub colors: ColorTable,
     /// Whether each object is on the path from the top.
     pub on_path: Vec<bool>,
     /// Whether each object is among the problems already.
@@ -142,6 +145,7 @@ pub fn walk(file: &Path, database: &Database, tops: &[u32]) -> Result<Regions> {
     let mut walk = Walk {
         file,
         database,
+        colors: ColorTable::new(&database.colors),
         on_path: vec![false; objects],
         is_problem: vec![false; objects],
         paths: Vec::new(),
