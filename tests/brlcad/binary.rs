@@ -8,7 +8,7 @@ use lanecast::error::{Error, Result};
 use lanecast::ray::{Hits, Rays};
 use lanecast::scene::brlcad::describe::{Options, describe};
 use lanecast::scene::brlcad::regions::walk;
-use lanecast::scene::brlcad::{Database, ObjectKind, choose_tops, parse};
+use lanecast::scene::brlcad::{Database, ObjectKind, Region, choose_tops, parse};
 use lanecast::scene::description::Description;
 use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::world::{Preset, World};
@@ -358,11 +358,19 @@ fn errors_say_at_which_byte_and_what_was_expected() {
     let mut nan = bytes.clone();
     nan[body + 16..body + 24].copy_from_slice(&f64::NAN.to_be_bytes());
     starts(refused(&nan), body + 16, "a number of a `ell` (a finite number)");
+}
+
+#[test]
+fn odd_attributes_are_warnings() {
     let mut to = Writer::default();
-    let place = to.combination("c", &[("region", "R"), ("rgb", "1/2/300")], &[], &[]);
-    let error = refused(&to.bytes);
-    let what = "its attribute `rgb`: expected a colour R/G/B, each 0 to 255, found `1/2/300`";
-    assert_eq!(error, format!("d.g: byte {place}: {what}"));
+    let place =
+        to.combination("c", &[("region", "R"), ("rgb", "1/2/300"), ("los", "100.0"), ("aircode", "")], &[], &[]);
+    let database = read(&to.bytes).unwrap();
+    let ObjectKind::Combination(c) = &database.objects[0].kind else { panic!("no combination") };
+    assert_eq!((c.rgb, c.region), (None, Some(Region { los: 100, ..Region::default() })));
+    let colour = "attribute `rgb`: expected a colour R/G/B, each 0 to 255, found `1/2/300`; done without a colour";
+    let number = "attribute `los`: expected a whole number, found `100.0`, which counts as 100";
+    assert_eq!(database.warnings, [colour, number].map(|what| format!("`c` (byte {place}): {what}")));
 }
 
 #[test]

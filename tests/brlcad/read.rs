@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use lanecast::error::{Error, Result};
 use lanecast::scene::brlcad::describe::{Options, describe};
 use lanecast::scene::brlcad::regions::{Regions, walk};
-use lanecast::scene::brlcad::{Database, ObjectKind, choose_tops, parse, tops};
+use lanecast::scene::brlcad::{Database, ObjectKind, Region, choose_tops, parse, tops};
 
 use crate::common;
 use common::Random;
@@ -201,13 +201,40 @@ fn errors_say_file_line_column_and_what_was_expected() {
         (v5("put {a} comb region yes tree {u {l b} {l c} {l d}}"), "d.asc:2:46: expected the end of the tree"),
         (v5("put {a"), "d.asc:2:5: this `{` is never closed"),
         (v5("attr set {b} {rgb} {1/2/3}"), "d.asc:2:1: attributes of `b`, which is defined nowhere"),
-        (v5("put {a} comb region no tree {l b}\nattr set a rgb 1/2/300"), "d.asc:3:16: expected a colour R/G/B"),
         (v5("exec rm -rf"), "d.asc:2:1: expected title, units, color, put or attr, found `exec`"),
     ] {
         let error = read(&text).unwrap_err();
         assert_eq!(error.exit_code(), 2);
         assert!(error.to_string().starts_with(expected), "{error}\nexpected: {expected}");
     }
+}
+
+/// As BRL-CAD does: it reads numbers with `atol`, and says of a colour that it cannot read that there is none.
+#[test]
+fn odd_attributes_are_warnings() {
+    let text = "title {t}\nput r comb region yes id 7 air 1 los 50 GIFTmater 2 rgb {1 2 3} tree {l s}\n";
+    let with = |settings: &str| {
+        let database = read(&format!("{text}attr set r {settings}\n")).unwrap();
+        let ObjectKind::Combination(r) = &database.objects[0].kind else { panic!("no combination") };
+        (r.region.unwrap(), r.rgb, database.warnings)
+    };
+    let (region, rgb, warnings) = with("region_id {} aircode {} los {} material_id {}");
+    assert_eq!((region, rgb, warnings), (Region::default(), Some([1, 2, 3]), Vec::new()), "empty numbers are 0");
+    let (region, rgb, warnings) = with("region_id { 12 } aircode x1 los 100.0 material_id -99999999999 rgb {}");
+    assert_eq!((region, rgb), (Region { id: 12, air: 0, los: 100, material: i32::MIN }, None));
+    let number = |key: &str, found: &str, number: i32| {
+        format!("`r` (line 3): attribute `{key}`: expected a whole number, found `{found}`, which counts as {number}")
+    };
+    let colour = |found: &str| {
+        let what = "expected a colour R/G/B, each 0 to 255, found";
+        format!("`r` (line 3): attribute `rgb`: {what} {found}; done without a colour")
+    };
+    let numbers =
+        [number("aircode", "x1", 0), number("los", "100.0", 100), number("material_id", "-99999999999", i32::MIN)];
+    assert_eq!(warnings[..3], numbers);
+    assert_eq!((warnings.len(), warnings[3].starts_with("`r` (line 3): attribute `rgb`: ")), (4, true), "{warnings:?}");
+    assert_eq!(with("rgb 1/2/300").2, [colour("`1/2/300`")]);
+    assert_eq!(with("los +7%").0.los, 7);
 }
 
 #[test]

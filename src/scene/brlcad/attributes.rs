@@ -10,30 +10,53 @@ pub(super) const REGION: &str = "region";
 /// Sets what `key` with the value `text` means for `combination`; false if it means nothing here. Of `rgb` and `color`
 /// and of `oshader` and `shader`, the later one counts, as both are names of one thing.
 ///
-/// # Errors
-/// In words, what was expected.
-pub(super) fn set(combination: &mut Combination, key: &str, text: &str) -> Result<bool, String> {
+/// Attributes are whatever somebody typed, and BRL-CAD shows a database whose attributes are odd: a number counts up to
+/// its first character that is none, and is 0 without any (C's `atol`); a colour that cannot be read is none. What was
+/// not taken as it stands is said to `warn`, in words.
+pub(super) fn set(combination: &mut Combination, key: &str, text: &str, mut warn: impl FnMut(String)) -> bool {
     let text = text.trim();
     match key {
         // Whatever else it says, 0 too: that is the kind of region, no number of any.
         REGION if !matches!(text, "" | "no" | "false" | "N" | "n") => _ = combination.region.get_or_insert_default(),
         REGION => {}
-        "rgb" | "color" => combination.rgb = Some(rgb(text)?),
+        "rgb" | "color" => {
+            combination.rgb = rgb(text).inspect_err(|what| warn(format!("{what}; done without a colour"))).ok();
+        }
         "oshader" | "shader" => combination.shader = (!text.is_empty()).then(|| text.to_owned()),
         "inherit" => combination.inherit = !matches!(text, "" | "0" | "no" | "false" | "N" | "n"),
         _ => {
-            let Some(region) = &mut combination.region else { return Ok(false) };
+            let Some(region) = &mut combination.region else { return false };
             let number = match key {
                 "region_id" => &mut region.id,
                 "aircode" => &mut region.air,
                 "los" => &mut region.los,
                 "material_id" => &mut region.material,
-                _ => return Ok(false),
+                _ => return false,
             };
-            *number = text.parse().map_err(|_| format!("expected a whole number, found {}", shown(text.as_bytes())))?;
+            *number = match text.parse() {
+                Ok(number) => number,
+                Err(_) if text.is_empty() => 0,
+                Err(_) => {
+                    let number = leading_number(text);
+                    let found = shown(text.as_bytes());
+                    warn(format!("expected a whole number, found {found}, which counts as {number}"));
+                    number
+                }
+            };
         }
     }
-    Ok(true)
+    true
+}
+
+/// The number with which `text` begins, 0 if it begins with none; one beyond the range is the last one in it.
+fn leading_number(text: &str) -> i32 {
+    let digits = text.strip_prefix(['-', '+']).unwrap_or(text);
+    let count = digits.bytes().take_while(u8::is_ascii_digit).count();
+    if count == 0 {
+        return 0;
+    }
+    let number = &text[..text.len() - digits.len() + count];
+    number.parse().unwrap_or(if number.starts_with('-') { i32::MIN } else { i32::MAX })
 }
 
 /// `r/g/b`, or three numbers with blanks between.

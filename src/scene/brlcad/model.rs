@@ -121,9 +121,14 @@ impl Database {
 
     /// Keeps a warning; beyond a hundred of them only the first hundred.
     pub(super) fn warn(&mut self, what: String) {
-        if self.warnings.len() < MAX_WARNINGS {
+        if self.may_warn() {
             self.warnings.push(what);
         }
+    }
+
+    /// Whether one more warning is kept.
+    pub(super) fn may_warn(&self) -> bool {
+        self.warnings.len() < MAX_WARNINGS
     }
 
     /// Number of the object called `name`.

@@ -108,13 +108,20 @@ fn apply(words: &Words<'_>, setting: &Setting<'_>, regions: bool, database: &mut
         return Err(words.error(setting.at, what));
     };
     let Object { kind, attributes: others, .. } = &mut database.objects[index as usize];
+    let mut odd = Vec::new();
     for (key, word) in pairs {
+        let warn = |what| odd.push((word.at, format!("attribute {}: {what}", shown(key.as_bytes()))));
         if let ObjectKind::Combination(combination) = kind
-            && attributes::set(combination, key, &word.text()).map_err(|what| words.error(word.at, what))?
+            && attributes::set(combination, key, &word.text(), warn)
         {
             continue;
         }
         others.push((key.clone(), word.text().into_owned()));
+    }
+    for (at, what) in odd {
+        if database.may_warn() {
+            database.warn(format!("`{}` (line {}): {what}", short(&setting.object), words.line_of(at)));
+        }
     }
     Ok(())
 }

@@ -62,6 +62,11 @@ impl<'a> Words<'a> {
         error_at(self.file, self.bytes, at, what)
     }
 
+    /// Number of the line of byte `at`, from 1: counts from the start of the file.
+    pub fn line_of(&self, at: usize) -> usize {
+        1 + self.bytes[..at].iter().filter(|&&b| b == b'\n').count()
+    }
+
     /// Where the cursor is.
     pub fn position(&self) -> usize {
         self.at

@@ -15,7 +15,7 @@ mod solids;
 use std::path::Path;
 
 use super::attributes;
-use super::model::{Attributes, ColorRange, Database, Object, ObjectKind};
+use super::model::{Attributes, ColorRange, Database, Object, ObjectKind, short};
 use crate::error::{Error, Place, Result};
 use crate::scene::text::shown;
 use cursor::Cursor;
@@ -122,7 +122,9 @@ fn object(file: &Path, all: &mut Cursor<'_>, budget: &mut Budget, database: &mut
     let kind = match (major, minor) {
         (GEOMETRY, COMBINATION) => {
             let mut combination = combination::read(body()?)?;
-            attributes = set_all(&start, &mut combination, attributes)?;
+            attributes = set_all(&mut combination, attributes, |what| {
+                database.warn(format!("`{}` (byte {}): {what}", short(&name), start.place()));
+            });
             ObjectKind::Combination(Box::new(combination))
         }
         (GEOMETRY, _) => solids::solid(minor, body)?,
@@ -133,25 +135,18 @@ fn object(file: &Path, all: &mut Cursor<'_>, budget: &mut Budget, database: &mut
     Ok(())
 }
 
-/// Sets what attributes mean for a combination and gives back those that mean nothing.
-fn set_all(start: &Cursor<'_>, combination: &mut super::Combination, pairs: Attributes) -> Result<Attributes> {
+/// Sets what attributes mean for a combination and gives back those that mean nothing; says to `warn` which were odd.
+fn set_all(combination: &mut super::Combination, pairs: Attributes, mut warn: impl FnMut(String)) -> Attributes {
     let (first, mut rest): (Attributes, Attributes) = pairs.into_iter().partition(|(key, _)| key == attributes::REGION);
     let mut set = |(key, value): &(String, String)| {
-        attributes::set(combination, key, value)
-            .map_err(|what| start.error(format!("its attribute {}: {what}", shown(key.as_bytes()))))
+        let warn = |what| warn(format!("attribute {}: {what}", shown(key.as_bytes())));
+        attributes::set(combination, key, value, warn)
     };
     for pair in &first {
-        set(pair)?;
+        set(pair);
     }
-    let mut failed = None;
-    rest.retain(|pair| match set(pair) {
-        Ok(known) => !known,
-        Err(error) => {
-            failed.get_or_insert(error);
-            true
-        }
-    });
-    failed.map_or(Ok(rest), Err)
+    rest.retain(|pair| !set(pair));
+    rest
 }
 
 /// Names and values, each with a zero byte at its end; an empty name ends them.
