@@ -291,6 +291,24 @@ fn mesh_references_stay_in_the_folder() {
 }
 
 #[test]
+fn errors_of_solids_say_where_they_were_written() {
+    let mut text = String::from("define a0 { union }\n");
+    (1..=24).for_each(|i| text += &format!("define a{i} {{ instance a{0}; instance a{0} }}\n", i - 1));
+    let shown = scene((text + "sphere\nunion { instance a24 }\n").as_bytes()).unwrap_err().to_string();
+    let wanted = "t.kdl:27:1: `union`: it expands to more than 8388608 operations\n 27 | union { instance a24 }\n";
+    assert!(shown.starts_with(wanted), "{shown}");
+
+    let root = tempfile::tempdir().unwrap();
+    std::fs::write(root.path().join("open.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let file = root.path().join("s.kdl");
+    std::fs::write(&file, "sphere\nmesh \"open.obj\"\ndifference {\n  box\n  mesh \"open.obj\"\n}\n").unwrap();
+    let shown = load(&file.to_string_lossy(), &LoadOptions::default()).unwrap_err().to_string();
+    let what = "`open.obj`: the mesh is not closed: the edge from ";
+    assert!(shown.starts_with(&format!("{}:5:3: {what}", file.display())), "{shown}");
+    assert!(shown.contains("\n 5 |   mesh \"open.obj\"\n"), "{shown}");
+}
+
+#[test]
 fn the_fuzz_corpus_has_known_verdicts() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/kdl");
     let Ok(entries) = std::fs::read_dir(&corpus) else {

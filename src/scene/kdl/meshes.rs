@@ -9,6 +9,7 @@ use crate::scene::description::{Description, Material};
 use crate::scene::mesh::Mesh;
 use crate::scene::obj::looks::Looks;
 use crate::scene::reference::{Found, References};
+use crate::scene::solids::flat::closed;
 
 /// Most triangles that generators and polygons of one document may make.
 pub const MAX_GENERATED: u64 = 1 << 24;
@@ -68,12 +69,26 @@ pub struct Store {
     pub digests: Vec<[u8; 32]>,
     by_key: HashMap<Key, u32>,
     generated: u64,
+    /// Meshes that were seen to be closed.
+    closed: HashSet<u32>,
 }
 
 impl Store {
     /// The stored mesh with `key`.
     pub fn find(&self, key: &Key) -> Option<u32> {
         self.by_key.get(key).copied()
+    }
+
+    /// Refuses mesh `index` if it has no inside; each is looked at once.
+    ///
+    /// # Errors
+    /// In words, where it is open.
+    pub fn check_closed(&mut self, index: u32) -> std::result::Result<(), String> {
+        if !self.closed.contains(&index) {
+            closed(&self.meshes[index as usize])?;
+            self.closed.insert(index);
+        }
+        Ok(())
     }
 
     /// Takes `triangles` from the allowance of generated triangles; false if it does not suffice.

@@ -1,6 +1,6 @@
 //! Solids made of solids: `union`, `intersection`, `difference`, `xor`, `complement`, and the solids that only they take.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
@@ -13,6 +13,7 @@ use super::syntax::Node;
 use super::{shapes, transform};
 use crate::error::Result;
 use crate::scene::description::ItemKind;
+use crate::scene::solids::flat::FlatTree;
 use crate::scene::solids::{NodeId, NodeKind, Placed, Polyhedron, Solid, SolidNode, SolidTree};
 use crate::scene::solids::{
     ellipsoid, elliptic_hyperboloid, elliptic_paraboloid, elliptic_torus, hyperboloid, torus, truncated_cone,
@@ -28,6 +29,8 @@ pub const SOLIDS: [&str; 8] =
 struct Building<'n> {
     tree: SolidTree,
     known: HashMap<&'n str, NodeId>,
+    /// Stored meshes that are operands.
+    meshes: HashSet<u32>,
     /// Definitions we are inside of.
     open: Vec<&'n str>,
     /// Operations we are inside of.
@@ -40,7 +43,13 @@ impl<'a, 'n> Lowering<'a, 'n> {
     /// # Errors
     /// The first thing that is wrong in it.
     pub fn solid(&mut self, node: &'n Node<'a>, place: Place) -> Result<()> {
-        let mut building = Building { tree: SolidTree::default(), known: HashMap::new(), open: Vec::new(), nested: 0 };
+        let mut building = Building {
+            tree: SolidTree::default(),
+            known: HashMap::new(),
+            meshes: HashSet::new(),
+            open: Vec::new(),
+            nested: 0,
+        };
         let root = self.operand(node, &mut building)?;
         let mut tree = building.tree;
         tree.root = root;
@@ -56,6 +65,11 @@ impl<'a, 'n> Lowering<'a, 'n> {
             }
             tree.tolerance = tolerance;
         }
+        // It is lowered again when the scene is put together, where nobody knows any more where it was written.
+        FlatTree::new(&tree).map_err(|what| {
+            let name: &str = if tree.name.is_empty() { &node.name } else { &tree.name };
+            self.scope.source.error(node.span, format!("{}: {what}", quote(name)))
+        })?;
         self.description.solids.push(Arc::new(tree));
         let index = self.description.solids.len() as u32 - 1;
         self.add(ItemKind::Solids(index), DAffine3::IDENTITY, place, node.span)
@@ -73,8 +87,16 @@ impl<'a, 'n> Lowering<'a, 'n> {
             "mesh" => {
                 let (mesh, scale, place) = self.mesh_of(node, Place::root_of(0))?;
                 self.count_item(node.span)?;
+                self.store.check_closed(mesh).map_err(|what| {
+                    let file = node.title().map_or("", |(name, _)| name);
+                    self.scope.source.error(node.span, format!("{}: {what}", quote(file)))
+                })?;
                 let (transform, material) = place.parts();
-                let kind = NodeKind::Solid(Solid::Mesh(self.store.meshes[mesh as usize].clone()));
+                let stored = self.store.meshes[mesh as usize].clone();
+                if building.meshes.insert(mesh) {
+                    building.tree.closed.push(stored.clone());
+                }
+                let kind = NodeKind::Solid(Solid::Mesh(stored));
                 Ok(building.tree.add(SolidNode { transform: transform * scale, material, kind }))
             }
             name if OPERATIONS.contains(&name) => self.operation(node, building),

@@ -99,6 +99,7 @@ impl FlatTree {
         if !(tree.tolerance >= 0.0 && tree.tolerance.is_finite()) {
             return Err(format!("its tolerance must be finite and not negative, found {}", tree.tolerance));
         }
+        flat.closed = tree.closed.iter().map(|mesh| Arc::as_ptr(mesh) as usize).collect();
         let mut on_path = vec![false; tree.nodes.len()];
         let mut path: Vec<Frame> = Vec::new();
         flat.enter(tree, tree.root, DAffine3::IDENTITY, None, &mut on_path, &mut path)?;

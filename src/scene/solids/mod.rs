@@ -46,6 +46,8 @@ pub struct SolidTree {
     /// Surfaces closer than this along a ray count as one (units of the tree's space); where it is smaller than the
     /// rounding of the engine's arithmetic, that rounding counts.
     pub tolerance: f64,
+    /// Meshes of the nodes that were seen to be closed: [`flat`] looks at the others only, as a look takes long.
+    pub closed: Vec<Arc<Mesh>>,
 }
 
 /// A solid or an operation, placed in its parent's space.
