@@ -141,6 +141,23 @@ fn exr_file(colour: impl Sync + Fn(usize, usize) -> (f32, f32, f32)) -> Vec<u8> 
 }
 
 #[test]
+fn luminance_alone_is_grey_and_with_chroma_refused() {
+    use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, WritableImage};
+    let read = |names: &[&str]| {
+        let list = names.iter().map(|&name| AnyChannel::new(name, FlatSamples::F32(vec![0.5; 6]))).collect();
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        Image::from_channels((3, 2), AnyChannels::sort(list)).write().to_buffered(&mut bytes).unwrap();
+        decode("t.exr", &bytes.into_inner(), Curve::Linear).map(|picture| picture.texels)
+    };
+    assert_eq!(read(&["Y"]), Ok(Texels::Float(vec![[0.5, 0.5, 0.5, 1.0]; 6])));
+    for names in [&["Y", "RY", "BY"][..], &["Y", "BY"]] {
+        let error = read(names).unwrap_err();
+        assert!(error.contains("luminance with chroma (Y, RY, BY) is not read"), "{error}");
+    }
+    assert!(read(&["R", "G", "B", "Y", "RY", "BY"]).is_ok());
+}
+
+#[test]
 fn what_cannot_be_read_says_why() {
     for (name, wanted) in [
         ("text.png", "expected a PNG, JPEG, Radiance HDR or EXR picture, found a file that begins `this is `"),

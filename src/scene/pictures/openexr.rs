@@ -67,6 +67,12 @@ fn open(bytes: &[u8]) -> Result<Reader<Cursor<&[u8]>>, String> {
     if !coloured && (has_channel(first, "R") || !has_channel(first, "Y")) {
         return Err("expected the channels R, G and B, or Y".into());
     }
+    // Luminance and chroma: Y alone would be shown grey.
+    if !coloured && ["RY", "BY"].iter().any(|name| has_channel(first, name)) {
+        return Err(
+            "expected the channels R, G and B, or Y alone: luminance with chroma (Y, RY, BY) is not read".into()
+        );
+    }
     Ok(reader)
 }
 
