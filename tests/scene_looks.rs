@@ -131,9 +131,10 @@ fn textures_of_every_number_with_coordinates_that_point_up() {
         }
         polygon material=\"m\" { point 0 0 0 0 0; point 1 0 0 1 0; point 0 1 0 0 1 }";
     let d = read_in(Some(folder.path()), text).unwrap();
-    assert_eq!(d.textures.len(), 2, "one of colours, one of numbers");
+    assert_eq!(d.textures.len(), 3, "one of colours, one of opacity, one of numbers");
     assert!(matches!(&d.textures[0].texels, Texels::Srgb8(t) if t[0] == [255, 0, 0, 128]));
-    assert!(matches!(d.textures[1].texels, Texels::Linear8(_)));
+    assert_eq!(d.textures[1].texels, Texels::Linear8(vec![[128, 128, 128, 255], [255; 4]]), "its alpha counts");
+    assert_eq!(d.textures[2].texels, Texels::Linear8(vec![[255, 0, 0, 128], [0, 255, 0, 255]]));
     let m = &d.materials[1];
     assert_eq!((m.diffuse, m.emission, m.alpha), (DVec3::ONE, DVec3::ONE, Alpha::Blend), "a texture is seen as it is");
     let t = &m.textures;

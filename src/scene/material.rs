@@ -115,7 +115,7 @@ pub enum Alpha {
 /// Textures of a material.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Textures {
-    /// Base colour (R, G, B) and opacity (A).
+    /// Base colour (R, G, B) and, without a texture of opacity, opacity (A).
     pub base: Option<TextureRef>,
     /// Opacity (R).
     pub opacity: Option<TextureRef>,

@@ -68,6 +68,22 @@ impl Texture {
         }
     }
 
+    /// The picture as opacity, in R, G and B: of one with transparent texels its alpha counts, of others what they show.
+    #[must_use]
+    pub fn into_opacity(mut self) -> Self {
+        fn from_alpha<T: Copy + PartialEq>(texels: &mut [[T; 4]], full: T) {
+            if texels.iter().any(|t| t[3] != full) {
+                texels.iter_mut().for_each(|t| *t = [t[3], t[3], t[3], full]);
+            }
+        }
+        match &mut self.texels {
+            Texels::Srgb8(t) | Texels::Linear8(t) => from_alpha(t, u8::MAX),
+            Texels::Linear16(t) => from_alpha(t, u16::MAX),
+            Texels::Float(t) => from_alpha(t, 1.0),
+        }
+        self
+    }
+
     /// Bytes of the texels.
     pub fn bytes(&self) -> u64 {
         (match &self.texels {

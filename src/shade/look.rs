@@ -255,9 +255,11 @@ impl<'a> Looks<'a> {
     pub fn opacity(&self, id: u32, surface: &Surface) -> f64 {
         let material = self.material(id);
         let opacity = || {
-            let base = self.sample(material.textures.base.as_ref(), surface).map_or(1.0, |c| f64::from(c[3]));
-            let own = self.sample(material.textures.opacity.as_ref(), surface).map_or(1.0, |c| f64::from(c[0]));
-            (material.opacity * base * own).clamp(0.0, 1.0)
+            // A picture of opacity says it all: it is often that of the base colour again, whose alpha would count twice.
+            let own = self.sample(material.textures.opacity.as_ref(), surface).map(|c| c[0]);
+            let base = || self.sample(material.textures.base.as_ref(), surface).map(|c| c[3]);
+            let share = own.or_else(base).map_or(1.0, f64::from);
+            (material.opacity * share).clamp(0.0, 1.0)
         };
         match material.alpha {
             Alpha::Opaque => 1.0,

@@ -6,7 +6,8 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use glam::{DAffine3, DMat3, DVec3};
 use lanecast::scene::description::{Description, Light, Material, Shape};
-use lanecast::scene::material::{Alpha, Scattering};
+use lanecast::scene::material::{Alpha, Scattering, TextureRef};
+use lanecast::scene::texture::{Texels, Texture};
 use lanecast::shade::Shades;
 use path_support::{
     add, dark, facets, lamp, look, near, parallel, parallelogram, paths, plane, scatters, seen, shape, sphere, under,
@@ -255,6 +256,19 @@ fn opacity_lets_its_share_pass() {
     disc(&mut d, blend(2.0));
     let got = seen::<f32>(&d, &under(30.0), &paths(8, 1024, 1)).x;
     assert!((got - 1.3).abs() < 0.01, "{got}");
+    // A picture of opacity stands in place of the base picture's alpha: both are often one file.
+    for (base, own, want) in [(true, true, 0.75), (true, false, 0.75), (false, true, 0.75), (false, false, 0.0)] {
+        let mut d = dark();
+        d.background = DVec3::ONE;
+        let texels = Texels::Float(vec![[0.25; 4]]);
+        d.textures.push(Texture { name: "quarter".into(), width: 1, height: 1, texels }.into());
+        let mut material = Material { alpha: Alpha::Blend, ..lamp(0.0) };
+        material.textures.base = base.then(|| TextureRef::new(0));
+        material.textures.opacity = own.then(|| TextureRef::new(0));
+        disc(&mut d, material);
+        let got = seen::<f32>(&d, &under(30.0), &paths(8, 1024, 1)).x;
+        assert!((got - want).abs() < 0.02, "{base} {own}: {got}");
+    }
     // As a shade: 0.7 of a point light behind it; below its cut-off it is not there, above it is whole.
     let point = Light::Point { position: DVec3::Z * 4.0, intensity: DVec3::splat(16.0) };
     for (alpha, want) in [

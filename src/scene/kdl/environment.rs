@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::fields::Fields;
-use super::images::Images;
+use super::images::{Images, Use};
 use super::meshes::MeshFiles;
 use super::scope::Scope;
 use super::syntax::Node;
@@ -13,7 +13,6 @@ use super::{sky, transform};
 use crate::error::Result;
 use crate::scene::light::Environment;
 use crate::scene::material::TextureRef;
-use crate::scene::pictures::Curve;
 use crate::scene::texture::{Texels, Texture};
 
 /// Most texels that are turned into floats here.
@@ -57,7 +56,7 @@ pub fn environment(
         (Arc::new(sky::sky(to_sun, turbidity, ground)), None)
     } else {
         let mut images = Images::new(files);
-        images.add(scope.source, written, span, Curve::Srgb)?;
+        images.add(scope.source, written, span, Use::Colour)?;
         let (texture, digest) = &images.decode(scope.source)?[0];
         (floats(texture).map_err(|what| scope.source.error(span, what))?, Some(*digest))
     };

@@ -4,7 +4,7 @@ use glam::{DAffine2, DMat2, DVec2, DVec3};
 
 use super::expression::sin_degrees;
 use super::fields::{Fields, NO_REST};
-use super::images::Images;
+use super::images::{Images, Use};
 use super::metals;
 use super::scope::Scope;
 use super::source::{Span, quote};
@@ -12,7 +12,6 @@ use super::syntax::{Node, Value};
 use crate::error::Result;
 use crate::scene::description::{Material, MaterialId};
 use crate::scene::material::{Alpha, Scattering, TextureRef, Wrap};
-use crate::scene::pictures::Curve;
 
 /// Fields of a material.
 const FIELDS: [&str; 6] = ["diffuse", "mirror", "emission", "one-sided", "opacity", "mask"];
@@ -201,9 +200,10 @@ fn texture(scope: &Scope<'_>, node: &Node<'_>, material: &mut Material, images: 
     let fields = Fields::collect(scope, node, &ALLOWED, NO_REST)?;
     let (written, span) = fields.title()?.ok_or_else(|| fields.error("expected `texture \"file.png\"`"))?;
     let (purpose, purpose_span) = fields.name("of")?.unwrap_or(("base", span));
-    let curve = match purpose {
-        "base" | "emission" => Curve::Srgb,
-        _ => Curve::Linear,
+    let usage = match purpose {
+        "base" | "emission" => Use::Colour,
+        "opacity" => Use::Opacity,
+        _ => Use::Numbers,
     };
     let strength = fields.number("strength")?;
     if strength.is_some() && purpose != "normal" {
@@ -233,7 +233,7 @@ fn texture(scope: &Scope<'_>, node: &Node<'_>, material: &mut Material, images: 
     };
     let nearest = fields.flag("nearest")?;
     let transform = transform(&fields)?;
-    let id = images.add(scope.source, written, span, curve)?;
+    let id = images.add(scope.source, written, span, usage)?;
     *slot = Some(TextureRef { transform, wrap: [wrap; 2], nearest, ..TextureRef::new(id) });
     if let Some(strength) = strength {
         looks.normal_scale = strength;

@@ -172,7 +172,7 @@ impl Reader<'_> {
         for ((texture, digest), usage) in decoded.into_iter().zip(images.uses) {
             let (texture, relief) = match usage {
                 Use::Colour | Use::Normals | Use::Metallic => (texture, false),
-                Use::Opacity => (opacity(texture), false),
+                Use::Opacity => (texture.into_opacity(), false),
                 Use::Roughness => (roughness(texture), false),
                 Use::Bump(bits) if heights::is_heights(&texture) => {
                     (heights::normals(&texture, f64::from_bits(bits)), true)
@@ -222,21 +222,6 @@ fn roughness(mut texture: Texture) -> Texture {
         Texels::Srgb8(t) | Texels::Linear8(t) => from_grey(t, u8::MAX),
         Texels::Linear16(t) => from_grey(t, u16::MAX),
         Texels::Float(t) => from_grey(t, 1.0),
-    }
-    texture
-}
-
-/// A picture as opacity: of one with transparent texels its alpha counts, of others their grey.
-fn opacity(mut texture: Texture) -> Texture {
-    fn from_alpha<T: Copy + PartialEq>(texels: &mut [[T; 4]], full: T) {
-        if texels.iter().any(|t| t[3] != full) {
-            texels.iter_mut().for_each(|t| *t = [t[3], t[3], t[3], full]);
-        }
-    }
-    match &mut texture.texels {
-        Texels::Srgb8(t) | Texels::Linear8(t) => from_alpha(t, u8::MAX),
-        Texels::Linear16(t) => from_alpha(t, u16::MAX),
-        Texels::Float(t) => from_alpha(t, 1.0),
     }
     texture
 }
