@@ -142,6 +142,23 @@ fn strips_fans_and_what_has_no_triangles() {
 }
 
 #[test]
+fn what_is_not_read_of_meshes_is_a_warning() {
+    let with = |attributes: &str| {
+        let rest = format!(
+            r#""nodes": [{{"mesh": 0}}], "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}},
+            {{"attributes": {{"POSITION": 0{attributes}}}}}]}}],
+            "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 36}}], "buffers": [{{"byteLength": 36}}]"#
+        );
+        scene(&rest, &floats(&TRIANGLE))
+    };
+    assert_eq!(with("").warnings, Vec::<String>::new());
+    let coloured = with(r#", "COLOR_0": 0"#);
+    assert_eq!(coloured.warnings, ["1 primitives have colours at their vertices (COLOR_0), which are not read"]);
+    assert_eq!(coloured.meshes.len(), 1, "the same mesh");
+}
+
+#[test]
 fn the_default_scene_is_the_one_shown() {
     let nodes = r#""nodes": [{"mesh": 0}, {"mesh": 0, "translation": [1, 0, 0], "children": [2]}, {"mesh": 0}]"#;
     let xs = |scenes: &str| -> Vec<f64> {

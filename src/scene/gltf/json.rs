@@ -125,6 +125,7 @@ pub struct Attributes {
     pub tangent: Option<u32>,
     pub texcoord_0: Option<u32>,
     pub texcoord_1: Option<u32>,
+    pub color_0: Option<u32>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]

@@ -51,6 +51,8 @@ pub struct Primitives {
     users: HashMap<u32, u32>,
     without_triangles: u64,
     incomplete: u64,
+    /// Those whose vertices have colours.
+    coloured: u64,
 }
 
 impl Primitives {
@@ -62,7 +64,7 @@ impl Primitives {
                 *users.entry(positions).or_default() += 1;
             }
         }
-        Self { stored: HashMap::new(), users, without_triangles: 0, incomplete: 0 }
+        Self { stored: HashMap::new(), users, without_triangles: 0, incomplete: 0, coloured: 0 }
     }
 
     /// The items that mesh `index` of the document, which must exist, consists of.
@@ -78,6 +80,7 @@ impl Primitives {
                 self.without_triangles += 1;
                 continue;
             };
+            self.coloured += u64::from(primitive.attributes.color_0.is_some());
             items.push(Item { transform: DAffine3::IDENTITY, material, kind: ItemKind::Mesh(mesh) });
         }
         Ok(items)
@@ -87,7 +90,9 @@ impl Primitives {
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let skipped = format!("{} primitives without triangles (points, lines) are left out", self.without_triangles);
         let cut = format!("{} primitives end in an incomplete triangle, which is left out", self.incomplete);
-        let all = [(self.without_triangles, skipped), (self.incomplete, cut)];
+        let coloured =
+            format!("{} primitives have colours at their vertices (COLOR_0), which are not read", self.coloured);
+        let all = [(self.without_triangles, skipped), (self.incomplete, cut), (self.coloured, coloured)];
         all.into_iter().filter(|(count, _)| *count > 0).map(|(_, what)| what)
     }
 
@@ -106,7 +111,8 @@ impl Primitives {
             Some(other) => return Err(document.error(path, format!("expected a mode from 0 to 6, found {other}"))),
         };
         let Some(positions) = primitive.attributes.position else { return Ok(None) };
-        let mut attributes = primitive.attributes;
+        // Colours make no mesh another one: they are not read.
+        let mut attributes = Attributes { color_0: None, ..primitive.attributes };
         if document.root.textures.is_empty() {
             // Nothing will look at coordinates and tangents.
             (attributes.tangent, attributes.texcoord_0, attributes.texcoord_1) = (None, None, None);
