@@ -143,19 +143,24 @@ fn strips_fans_and_what_has_no_triangles() {
 
 #[test]
 fn what_is_not_read_of_meshes_is_a_warning() {
-    let with = |attributes: &str| {
+    let with = |attributes: &str, of_mesh: &str, of_node: &str| {
         let rest = format!(
-            r#""nodes": [{{"mesh": 0}}], "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}},
-            {{"attributes": {{"POSITION": 0{attributes}}}}}]}}],
+            r#""nodes": [{{"mesh": 0{of_node}}}], "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}},
+            {{"attributes": {{"POSITION": 0{attributes}}}}}]{of_mesh}}}],
             "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}}],
             "bufferViews": [{{"buffer": 0, "byteLength": 36}}], "buffers": [{{"byteLength": 36}}]"#
         );
         scene(&rest, &floats(&TRIANGLE))
     };
-    assert_eq!(with("").warnings, Vec::<String>::new());
-    let coloured = with(r#", "COLOR_0": 0"#);
+    assert_eq!(with("", "", "").warnings, Vec::<String>::new());
+    let coloured = with(r#", "COLOR_0": 0"#, "", "");
     assert_eq!(coloured.warnings, ["1 primitives have colours at their vertices (COLOR_0), which are not read"]);
     assert_eq!(coloured.meshes.len(), 1, "the same mesh");
+    for (of_mesh, of_node, warns) in [("[0, 0]", "[]", false), ("[0, 0.5]", "[0]", true), ("[0]", "[-1]", true)] {
+        let [of_mesh, of_node] = [of_mesh, of_node].map(|list| format!(r#", "weights": {list}"#));
+        let wanted = ["morph targets are not applied, though they have weights other than 0"];
+        assert_eq!(with("", &of_mesh, &of_node).warnings, wanted[..usize::from(warns)], "{of_mesh}{of_node}");
+    }
 }
 
 #[test]

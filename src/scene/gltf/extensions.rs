@@ -51,6 +51,9 @@ pub fn check(file: &Path, root: &Root) -> Result<Vec<String>> {
     if !root.skins.is_empty() || !root.animations.is_empty() {
         warnings.push("skins and animations are not applied".into());
     }
+    if root.meshes.iter().any(|mesh| mesh.is_morphed) || root.nodes.iter().any(|node| node.is_morphed) {
+        warnings.push("morph targets are not applied, though they have weights other than 0".into());
+    }
     Ok(warnings)
 }
 

@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde::{Deserialize, Deserializer};
 
 use super::container::Parts;
 use super::json_looks::{Image, Material, NodeLight, RootExtensions, Sampler, Texture};
@@ -77,6 +77,8 @@ pub struct Node {
     pub rotation: Option<Box<[f64; 4]>>,
     pub scale: Option<Box<[f64; 3]>>,
     pub extensions: Option<Box<NodeExtensions>>,
+    #[serde(default, rename = "weights", deserialize_with = "any_but_zero")]
+    pub is_morphed: bool,
 }
 
 #[derive(Debug, Deserialize)]
@@ -106,6 +108,14 @@ pub struct Mesh {
     pub name: Option<Box<str>>,
     #[serde(default)]
     pub primitives: Box<[Primitive]>,
+    #[serde(default, rename = "weights", deserialize_with = "any_but_zero")]
+    pub is_morphed: bool,
+}
+
+/// Of the weights of morph targets, whether any of them shows: that takes no room in objects without.
+fn any_but_zero<'de, D: Deserializer<'de>>(weights: D) -> std::result::Result<bool, D::Error> {
+    let weights = Option::<Vec<f64>>::deserialize(weights)?;
+    Ok(weights.is_some_and(|weights| weights.iter().any(|&weight| weight != 0.0)))
 }
 
 #[derive(Debug, Deserialize)]
