@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use lanecast::error::{Error, Result};
 use lanecast::scene::description::{Description, Light, Material};
 use lanecast::scene::kdl::{meshes::MeshFiles, parse};
+use lanecast::scene::load::{LoadOptions, load};
 use lanecast::scene::material::{Alpha, Scattering, Wrap};
 use lanecast::scene::texture::Texels;
 
@@ -154,6 +155,26 @@ fn textures_of_every_number_with_coordinates_that_point_up() {
     let other = std::fs::read(folder.path().join("a.png")).unwrap();
     std::fs::write(folder.path().join("a.png"), [other, vec![0]].concat()).unwrap();
     assert_ne!(read_in(Some(folder.path()), text).unwrap().hash, d.hash, "pictures are part of the scene");
+}
+
+#[test]
+fn textures_without_coordinates_are_a_warning() {
+    let folder = pictures();
+    std::fs::write(folder.path().join("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl b\nf 1 2 3\n").unwrap();
+    let warnings = |items: &str| {
+        let file = folder.path().join("t.kdl");
+        let materials = ["a", "b", "c"].map(|name| format!("material {name} {{ texture \"a.png\" }}\n")).concat();
+        std::fs::write(&file, format!("material plain\n{materials}{items}")).unwrap();
+        load(&file.to_string_lossy(), &LoadOptions::default()).unwrap().warnings
+    };
+    let bare = |name: &str| format!("polygon material={name} {{ point 0 0 0; point 1 0 0; point 0 1 0 }}\n");
+    let mapped = "polygon material=a { point 0 0 0 0 0; point 1 0 0 1 0; point 0 1 0 0 1 }\n";
+    // Shapes have coordinates; of a mesh with materials of its own the item's one counts.
+    let fine = bare("plain") + mapped + "sphere material=c\nmesh \"m.obj\" material=plain\n";
+    assert_eq!(warnings(&fine), Vec::<String>::new());
+    let both = warnings(&(fine + &bare("a") + &bare("a") + "mesh \"m.obj\"\n"));
+    let what = "stands on a mesh without the texture coordinates that its textures need: one texel colours all of it";
+    assert_eq!(both, ["a", "b"].map(|name| format!("the material `{name}` {what}")));
 }
 
 #[test]

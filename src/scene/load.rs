@@ -11,7 +11,7 @@ use super::kdl::meshes::{MeshFile, MeshFiles, add_looks, add_mesh_materials};
 use super::obj::looks::Looks;
 use super::reference::{Found, References};
 use super::unpack::UnpackLimit;
-use super::{brlcad, builtin, gltf, kdl, obj, ply, stl, unpack};
+use super::{brlcad, builtin, gltf, kdl, obj, ply, stl, unmapped, unpack};
 use crate::error::{Error, Result, nearest_name};
 
 /// Extensions that [`load`] reads; files may also be packed (`.ply.gz`, `.glb.zst`).
@@ -71,6 +71,7 @@ pub fn load_with(scene: &str, options: &LoadOptions, read: &ReadMesh<'_>) -> Res
     };
     description.source = Some(path.to_path_buf());
     description.files = found.into_files();
+    unmapped::warn(&mut description);
     Ok(description)
 }
 

@@ -165,6 +165,13 @@ pub enum Wrap {
 }
 
 impl Textures {
+    /// All uses of textures.
+    pub fn uses(&self) -> impl Iterator<Item = TextureRef> {
+        let light = [self.base, self.opacity, self.emission, self.occlusion];
+        let form = [self.metallic_roughness, self.metallic, self.transmission, self.normal];
+        light.into_iter().chain(form).flatten()
+    }
+
     /// All uses of textures, to renumber them.
     pub fn uses_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
         let all = [

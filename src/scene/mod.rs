@@ -21,6 +21,7 @@ pub mod solids;
 pub mod stl;
 mod text;
 pub mod texture;
+mod unmapped;
 pub mod unpack;
 mod weld;
 pub mod world;
