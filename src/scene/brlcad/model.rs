@@ -121,14 +121,14 @@ impl Database {
 
     /// Keeps a warning; beyond a hundred of them only the first hundred.
     pub(super) fn warn(&mut self, what: String) {
-        if self.may_warn() {
+        if self.warnings_left() > 0 {
             self.warnings.push(what);
         }
     }
 
-    /// Whether one more warning is kept.
-    pub(super) fn may_warn(&self) -> bool {
-        self.warnings.len() < MAX_WARNINGS
+    /// How many more warnings are kept.
+    pub(super) fn warnings_left(&self) -> usize {
+        MAX_WARNINGS.saturating_sub(self.warnings.len())
     }
 
     /// Number of the object called `name`.

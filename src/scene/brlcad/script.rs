@@ -107,10 +107,15 @@ fn apply(words: &Words<'_>, setting: &Setting<'_>, regions: bool, database: &mut
         let what = format!("attributes of `{}`, which is defined nowhere", short(&setting.object));
         return Err(words.error(setting.at, what));
     };
+    let left = database.warnings_left();
     let Object { kind, attributes: others, .. } = &mut database.objects[index as usize];
     let mut odd = Vec::new();
     for (key, word) in pairs {
-        let warn = |what| odd.push((word.at, format!("attribute {}: {what}", shown(key.as_bytes()))));
+        let warn = |what| {
+            if odd.len() < left {
+                odd.push((word.at, format!("attribute {}: {what}", shown(key.as_bytes()))));
+            }
+        };
         if let ObjectKind::Combination(combination) = kind
             && attributes::set(combination, key, &word.text(), warn)
         {
@@ -119,9 +124,7 @@ fn apply(words: &Words<'_>, setting: &Setting<'_>, regions: bool, database: &mut
         others.push((key.clone(), word.text().into_owned()));
     }
     for (at, what) in odd {
-        if database.may_warn() {
-            database.warn(format!("`{}` (line {}): {what}", short(&setting.object), words.line_of(at)));
-        }
+        database.warn(format!("`{}` (line {}): {what}", short(&setting.object), words.line_of(at)));
     }
     Ok(())
 }
