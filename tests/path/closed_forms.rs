@@ -267,7 +267,7 @@ fn opacity_lets_its_share_pass() {
         material.textures.opacity = own.then(|| TextureRef::new(0));
         disc(&mut d, material);
         let got = seen::<f32>(&d, &under(30.0), &paths(8, 1024, 1)).x;
-        assert!((got - want).abs() < 0.02, "{base} {own}: {got}");
+        assert!((got - want).abs() < 0.05, "{base} {own}: {got}");
     }
     // As a shade: 0.7 of a point light behind it; below its cut-off it is not there, above it is whole.
     let point = Light::Point { position: DVec3::Z * 4.0, intensity: DVec3::splat(16.0) };
