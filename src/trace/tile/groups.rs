@@ -7,7 +7,7 @@ use super::frame::Frame;
 use super::lines::Lines;
 use super::listing;
 use super::presumed::Look;
-use super::starts::Starts;
+use super::starts::{Room, Starts};
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
 use crate::lanes::minima::{quarter_minima, quarters, row_minima_of};
 use crate::lanes::words::{greatest, least};
@@ -92,6 +92,8 @@ pub struct Groups {
     pub ahead: [V; GROUPS],
     /// Of a full tile of segments to a common end: where they start.
     pub starts: Option<Starts>,
+    /// Of segments without a common start: where they are.
+    pub room: Option<Room>,
     /// Surely no segment starts nearer than at this depth.
     pub front: f32,
     /// Relative error of depths computed from a ray's parameter.
@@ -142,6 +144,7 @@ impl Default for Groups {
             behind: [V::splat(0.0); GROUPS],
             ahead: [V::splat(0.0); GROUPS],
             starts: None,
+            room: None,
             front: 0.0,
             loose: 0.0,
             rect: [[zero; 2]; 2],
@@ -286,6 +289,7 @@ impl Groups {
         }
         self.slack = (bundle.slack + 8.0 * HALF_ULP * greatest(reach)) * self.frame.scale;
         self.is_behind = bundle.shared == Shared::Behind;
+        self.room = if EXACT { None } else { Room::of::<N>(self, bundle) };
         (self.front, self.loose) = (0.0, 32.0 * HALF_ULP * (1.0 + self.wide));
         if self.is_behind {
             let front = least(front);

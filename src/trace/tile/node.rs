@@ -10,6 +10,7 @@
 use super::frame::Frame;
 use super::groups::Groups;
 use super::spans::{Spans, groups_of};
+use super::starts::Room;
 use super::{HALF_ULP, SET, V};
 use crate::bvh::{Node, Nodes, Tree};
 use crate::lanes::words::{signs, upper_halves, without_key};
@@ -52,6 +53,8 @@ pub struct Planes {
     /// Boxes that end before this depth are not met.
     front: f32,
     apex: [f32; 3],
+    /// Where segments are, if that is known in the space of the boxes.
+    pub room: Option<Room>,
     /// See [`Spans`].
     pub spans: Spans,
 }
@@ -106,6 +109,7 @@ impl Planes {
             depth_margin: 0.0,
             front: groups.front,
             apex: frame.apex,
+            room: None,
             spans: Spans::of::<N>(groups, frame, margin),
         };
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
@@ -159,7 +163,12 @@ impl Planes {
         let least = left_low.fast_min(below_low).fast_min(right_high.fast_min(above_high));
         let near = mz - rz;
         let outside = least.cmp_lt(zero) | (mz + rz).cmp_lt(splat(self.front)) | splat(tile.farthest).cmp_lt(near);
-        let met = !outside.bits() & ((1u32 << node.used.min(WIDTH as u32)) - 1);
+        let mut met = !outside.bits() & ((1u32 << node.used.min(WIDTH as u32)) - 1);
+        if let Some(room) = &self.room {
+            // As far as the same differences tell: rounding keeps their order.
+            let [x, y, z] = each(|a| hi[a].cmp_lt(splat(room.lo[a])) | splat(room.hi[a]).cmp_lt(lo[a]));
+            met &= !(x | y | z).bits();
+        }
         if met == 0 {
             return 0;
         }

@@ -70,12 +70,14 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
     let space = |margin| Space { apex: frame.apex, margin: margin + 2.0 * slack, extent: frame.extent, to_local: None };
     if !EXACT && memory.groups.many {
         let margin = place::margin(exact.world, frame);
-        let planes = Planes::of::<N>(&memory.groups, frame, margin);
+        let mut planes = Planes::of::<N>(&memory.groups, frame, margin);
+        planes.room = memory.groups.room;
         let view = View { tree: &exact.world.top, planes, space: space(margin), first: 0 };
         descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &Instances(exact.world), groups, counters);
     } else {
         let margin = node::MARGIN * HALF_ULP * frame.extent;
-        let planes = Planes::of::<N>(&memory.groups, frame, margin);
+        let mut planes = Planes::of::<N>(&memory.groups, frame, margin);
+        planes.room = memory.groups.room;
         let view = View { tree: &exact.object.tree, planes, space: space(margin), first: 0 };
         let leaves = Blocks { object: exact.object, place: None };
         descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &leaves, groups, counters);
