@@ -167,7 +167,10 @@ pub fn read_mesh(path: &Path, references: &References<'_>) -> Result<MeshFile> {
             let looks = obj::looks::read(path, &file, references)?;
             (file.mesh, looks)
         }
-        "ply" => (ply::parse(path, &bytes)?, Looks::default()),
+        "ply" => {
+            let file = ply::read(path, &bytes)?;
+            (file.mesh, Looks { warnings: file.warnings, ..Looks::default() })
+        }
         _ => (stl::parse(path, &bytes)?, Looks::default()),
     };
     Ok(MeshFile { mesh, digest, looks })

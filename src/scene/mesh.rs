@@ -6,7 +6,7 @@ use glam::DVec3;
 
 /// An indexed triangle mesh. Positions keep the file's values (f32 files widen exactly), indices the file's order
 /// and winding; nothing is dropped here, so triangle `i` of the mesh is triangle `i` of the file (polygons are
-/// fanned in place).
+/// made of triangles in place).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Vertex positions, object space, scene units. May hold non-finite values: they are dropped and counted when

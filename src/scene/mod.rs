@@ -16,6 +16,7 @@ pub mod obj;
 pub mod parameter;
 pub mod pictures;
 pub mod ply;
+mod polygon;
 pub mod reference;
 pub mod solids;
 pub mod stl;

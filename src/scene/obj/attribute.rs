@@ -1,6 +1,7 @@
 //! Texture coordinates and normals of an OBJ file, which have indices of their own at each corner.
 
 use crate::scene::mesh::Attribute;
+use crate::scene::polygon;
 
 /// The index of a corner without a value.
 pub(super) const NONE: u32 = u32::MAX;
@@ -41,6 +42,13 @@ impl<T: Copy + Default> Column<T> {
             self.indices.resize(triangle, [NONE; 3]);
         }
         self.indices.push(corners);
+    }
+
+    /// Cuts the polygon whose fan of `count` triangles begins with number `first` another way ([`polygon`]).
+    pub fn cut(&mut self, cut: &[[u32; 3]], first: usize, count: usize) {
+        if !self.indices.is_empty() {
+            polygon::apply(cut, &mut self.indices[first..first + count]);
+        }
     }
 
     /// The attribute of a mesh of `triangles`: corners without a value have the default one.

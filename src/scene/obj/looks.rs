@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::scene::material::{Material, TextureId, TextureRef, Wrap};
 use crate::scene::mtl::{self, Entry, Map};
 use crate::scene::pictures::{Content, Curve, Picture, decode_all, is_known};
+use crate::scene::polygon;
 use crate::scene::reference::References;
 use crate::scene::text;
 use crate::scene::texture::{Texels, Texture};
@@ -62,6 +63,7 @@ pub fn read(file: &Path, obj: &ObjFile, references: &References<'_>) -> Result<L
         let what = format!("{} corners name texture coordinates or normals that are not there", obj.dangling);
         reader.out.warnings.push(what);
     }
+    reader.out.warnings.extend(polygon::warning(obj.large_polygons));
     if ignored > 0 {
         reader.out.warnings.push(format!("{ignored} statements or options of material libraries are not read"));
     }

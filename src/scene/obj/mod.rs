@@ -20,6 +20,7 @@ use glam::DVec3;
 
 use self::attribute::{Column, NONE};
 use super::mesh::{Mesh, MeshGroup};
+use super::polygon::{self, Polygons};
 use super::text::{self, Word, Words};
 use crate::error::Result;
 
@@ -31,7 +32,7 @@ const MAX_VERTEX_NUMBERS: usize = 7;
 /// What an OBJ file holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjFile {
-    /// The polygons, fanned in place. Groups have the name of the last `g` or `o` and the last `usemtl` (names run
+    /// The polygons as triangles, in place: fanned from the first corner, or cut where that would not be their area. Groups have the name of the last `g` or `o` and the last `usemtl` (names run
     /// to the end of their line and are cut to 255 bytes).
     pub mesh: Mesh,
     /// Material libraries in the order of their `mtllib` statements, as written. None of them is opened.
@@ -40,6 +41,8 @@ pub struct ObjFile {
     pub ignored: u64,
     /// Corners whose texture coordinates or normal the file does not have.
     pub dangling: u64,
+    /// Polygons that are fanned although they are not convex, because they have thousands of corners.
+    pub large_polygons: u64,
 }
 
 /// Reads the bytes of an OBJ file; `file` is only for error messages.
@@ -55,6 +58,7 @@ pub fn parse(file: &Path, bytes: &[u8]) -> Result<ObjFile> {
         material: String::new(),
         uvs: Column::default(),
         normals: Column::default(),
+        polygons: Polygons::default(),
         run_first: 0,
         highest: None,
         unknown: None,
@@ -81,6 +85,7 @@ struct Reader<'a> {
     material: String,
     uvs: Column<[f32; 2]>,
     normals: Column<[f32; 3]>,
+    polygons: Polygons,
     /// First triangle of the current run.
     run_first: usize,
     /// The highest 0-based index used before its vertex was there, and where: checked at the end.
@@ -171,6 +176,7 @@ impl<'a> Reader<'a> {
 
     fn face(&mut self) -> Result<()> {
         let (mut first, mut last, mut corners) = (Corner::default(), Corner::default(), 0_usize);
+        let (start, mut highest) = (self.out.mesh.triangles.len(), 0);
         while let Some(word) = self.words.next_value() {
             let corner = self.corner(word)?;
             if corners == 0 {
@@ -187,9 +193,28 @@ impl<'a> Reader<'a> {
             }
             last = corner;
             corners += 1;
+            highest = highest.max(corner.vertex);
+        }
+        if corners > 3 {
+            let end = self.out.mesh.triangles.len();
+            if (highest as usize) < self.out.mesh.positions.len() {
+                self.cut(start, end);
+            } else {
+                self.polygons.later.push([start as u32, end as u32]);
+            }
         }
         self.out.ignored += u64::from(corners < 3);
         Ok(())
+    }
+
+    /// Cuts the polygon whose fan are the triangles from `start` to `end`, if the fan is not its area.
+    fn cut(&mut self, start: usize, end: usize) {
+        let fan = &mut self.out.mesh.triangles[start..end];
+        if let Some(cut) = self.polygons.cut(fan, &self.out.mesh.positions) {
+            polygon::apply(&cut, fan);
+            self.uvs.cut(&cut, start, end - start);
+            self.normals.cut(&cut, start, end - start);
+        }
     }
 
     /// The 0-based indices of `v`, `v/vt`, `v//vn` or `v/vt/vn`.
@@ -276,6 +301,10 @@ impl<'a> Reader<'a> {
             let what = format!("expected an OBJ statement such as `v` or `f`, found {}", word.shown());
             return Err(self.words.error(word.at, what).with_help("the file has no vertex: is it an OBJ file?"));
         }
+        for [start, end] in std::mem::take(&mut self.polygons.later) {
+            self.cut(start as usize, end as usize);
+        }
+        self.out.large_polygons = self.polygons.large;
         self.close_run();
         if let [only] = self.out.mesh.groups.as_slice()
             && only.name.is_empty()

@@ -51,6 +51,36 @@ fn polygons_are_fanned_in_place() {
 }
 
 #[test]
+fn polygons_that_a_fan_would_not_cover_are_cut() {
+    // An arrow, then an L from the corner that sees least of it; their vertices once before and once behind.
+    let vertices = "v 2 0 0\nv 0 2 0\nv -2 0 0\nv 0 0.5 0\nv 0 0 0\nv 2 2 0\nv 1 2 0\nv 1 1 0\nv 0 1 0\n\
+                    vt 0 0\nvt 0 1\nvt 0 2\nvt 0 3\nvn 0 0 1\n";
+    let faces = "f 1/4 2/3 3/2 4/1\nf 7//1 8//1 9//1 5 1//1 6//1\n";
+    for text in [format!("{vertices}{faces}"), format!("{faces}{vertices}")] {
+        let out = read(&text);
+        let mesh = &out.mesh;
+        assert_eq!(mesh.triangles[..2], [[1, 2, 3], [3, 0, 1]]);
+        assert_eq!(mesh.uvs[0].indices[..2], [[2, 1, 0], [0, 3, 2]], "coordinates follow their corners");
+        let z = |i: usize| {
+            let [a, b, c] = mesh.corners(i);
+            (b - a).cross(c - a).z / 2.0
+        };
+        assert_eq!(mesh.triangles.len(), 6);
+        assert!((0..6).all(|i| z(i) > 0.0), "{:?}", mesh.triangles);
+        assert_eq!([(0..2).map(z).sum::<f64>(), (2..6).map(z).sum()], [3.0, 3.0]);
+        for (vertices, normals) in mesh.triangles[2..].iter().zip(&mesh.normals.indices[2..]) {
+            assert_eq!(normals.map(|normal| normal == 1), vertices.map(|vertex| vertex == 4), "only 5 has none");
+        }
+        assert_eq!(out.large_polygons, 0);
+    }
+    let star = |i: u32| [2.0, 1.0][i as usize % 2] * glam::DVec2::from_angle(f64::from(i) * 1e-3);
+    let corners: String = (0..5000).map(star).map(|p| format!("v {} {} 0\n", p.x, p.y)).collect();
+    let face: String = (1..=5000).map(|i| format!(" {i}")).collect();
+    let out = read(&format!("{corners}f{face}\n"));
+    assert_eq!((out.large_polygons, out.mesh.triangles.last()), (1, Some(&[0, 4998, 4999])));
+}
+
+#[test]
 fn line_ends_continuations_comments_and_blanks() {
     let text =
         "\u{feff}# C:\\models\\\r\n\r\n  v 0 0 0 # origin\r\nv\t1 0\\\r\n 0\r\nv 0 1 0\\\r\n\r\n#\r\nf 1 2 \\\r\n3";

@@ -2,8 +2,8 @@
 //!
 //! Source: Greg Turk, "The PLY Polygon File Format", 1994. Read are the element `vertex` (`x`, `y`, `z` of any
 //! scalar type, in any order; `nx`, `ny`, `nz` as shading normals; `u`, `v` or `s`, `t` or `texture_u`, `texture_v` as
-//! texture coordinates), the element `face` (the list `vertex_indices` or `vertex_index`, of any types, polygons fanned
-//! in place) and the element `tristrips` (the same list; -1 starts a new strip, every second triangle is turned so that
+//! texture coordinates), the element `face` (the list `vertex_indices` or `vertex_index`, of any types, polygons as
+//! triangles in place) and the element `tristrips` (the same list; -1 starts a new strip, every second triangle is turned so that
 //! all keep the winding of the first). Other properties and elements are passed over. Values keep their declared type:
 //! a text number of a `float` property is rounded to f32.
 //!
@@ -20,6 +20,7 @@ use glam::DVec3;
 use self::header::{Element, Format, Kind};
 use self::values::{Binary, Text, Values};
 use super::mesh::Mesh;
+use super::polygon::{self, Polygons};
 use crate::error::Result;
 
 /// Most triangles a mesh may have: numbers are u32 and the largest is kept for "none".
@@ -33,13 +34,30 @@ const NORMAL: usize = 3;
 const UV: usize = 6;
 const SLOTS: usize = 8;
 
+/// What a PLY file holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlyFile {
+    /// The polygons as triangles, in place: fanned from the first corner, or cut where that would not be their area.
+    pub mesh: Mesh,
+    /// What was passed over that people may miss.
+    pub warnings: Vec<String>,
+}
+
+/// The mesh of [`read`], and its errors.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn parse(file: &Path, bytes: &[u8]) -> Result<Mesh> {
+    read(file, bytes).map(|read| read.mesh)
+}
+
 /// Reads the bytes of a PLY file; `file` is only for error messages.
 ///
 /// # Errors
 /// In the header and in text, at line and column; in binary data, at the byte offset: unknown types and keywords,
 /// counts that do not fit the length of the file, values that are not numbers, lists of negative length, indices
 /// that name no vertex, data after the last element (padding with zeros or white space is allowed).
-pub fn parse(file: &Path, bytes: &[u8]) -> Result<Mesh> {
+pub fn read(file: &Path, bytes: &[u8]) -> Result<PlyFile> {
     let header = header::read(file, bytes)?;
     match header.format {
         Format::Text => read_body(&header.elements, Text::new(file, bytes, header.body)),
@@ -48,7 +66,7 @@ pub fn parse(file: &Path, bytes: &[u8]) -> Result<Mesh> {
     }
 }
 
-fn read_body<V: Values>(elements: &[Element], mut values: V) -> Result<Mesh> {
+fn read_body<V: Values>(elements: &[Element], mut values: V) -> Result<PlyFile> {
     check_counts(elements, &values)?;
     let vertices = elements.iter().find(|e| e.name == "vertex");
     let Some(vertices) = vertices else {
@@ -57,7 +75,8 @@ fn read_body<V: Values>(elements: &[Element], mut values: V) -> Result<Mesh> {
     if vertices.count >= u64::from(u32::MAX) {
         return Err(values.header_error(vertices.count_at, "more than 2^32 - 2 vertices".into()));
     }
-    let mut body = Body { mesh: Mesh::default(), vertices: vertices.count as i64 };
+    let (mesh, polygons) = (Mesh::default(), Polygons::default());
+    let mut body = Body { mesh, vertices: vertices.count as i64, polygons };
     for element in elements {
         match element.name.as_str() {
             "vertex" => body.vertices(element, &mut values)?,
@@ -67,7 +86,12 @@ fn read_body<V: Values>(elements: &[Element], mut values: V) -> Result<Mesh> {
         }
     }
     values.finish()?;
-    Ok(body.mesh)
+    // Files may have their faces before their vertices.
+    for [start, end] in std::mem::take(&mut body.polygons.later) {
+        body.cut(start as usize, end as usize);
+    }
+    let warnings = polygon::warning(body.polygons.large).into_iter().collect();
+    Ok(PlyFile { mesh: body.mesh, warnings })
 }
 
 /// Refuses counts that cannot be true: every row needs a least number of bytes.
@@ -116,6 +140,7 @@ struct Body {
     mesh: Mesh,
     /// Number of vertices the header declares, whether they have been read or not.
     vertices: i64,
+    polygons: Polygons,
 }
 
 impl Body {
@@ -195,6 +220,7 @@ impl Body {
 
     fn polygon<V: Values>(&mut self, item: header::Scalar, length: u64, values: &mut V) -> Result<()> {
         let (mut first, mut last) = (0, 0);
+        let start = self.mesh.triangles.len();
         for i in 0..length {
             let index = values.int(item)?;
             let corner = self.corner(index, values)?;
@@ -205,7 +231,23 @@ impl Body {
             }
             last = corner;
         }
+        if length > 3 {
+            let end = self.mesh.triangles.len();
+            if self.mesh.positions.is_empty() {
+                self.polygons.later.push([start as u32, end as u32]);
+            } else {
+                self.cut(start, end);
+            }
+        }
         Ok(())
+    }
+
+    /// Cuts the polygon whose fan are the triangles from `start` to `end`, if the fan is not its area.
+    fn cut(&mut self, start: usize, end: usize) {
+        let fan = &mut self.mesh.triangles[start..end];
+        if let Some(cut) = self.polygons.cut(fan, &self.mesh.positions) {
+            polygon::apply(&cut, fan);
+        }
     }
 
     fn strips<V: Values>(&mut self, item: header::Scalar, length: u64, values: &mut V) -> Result<()> {

@@ -43,6 +43,20 @@ fn text_polygons_are_fanned_in_place() {
 }
 
 #[test]
+fn polygons_that_a_fan_would_not_cover_are_cut() {
+    let text = header("ascii", 4, 1) + "2 0 0\n0 2 0\n-2 0 0\n0 0.5 0\n" + "4 0 1 2 3\n";
+    let mesh = read(&text);
+    assert_eq!((mesh.triangles.as_slice(), mesh.area()), ([[1, 2, 3], [3, 0, 1]].as_slice(), 3.0));
+    // Faces before their vertices.
+    let list = "property list uchar int vertex_indices\n";
+    let head = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
+    let turned = text.replace(&format!("{head}element face 1\n{list}"), &format!("element face 1\n{list}{head}"));
+    let turned = turned.replace("4 0 1 2 3\n", "").replace("end_header\n", "end_header\n4 0 1 2 3\n");
+    assert_ne!(turned, text);
+    assert_eq!(read(turned), mesh);
+}
+
+#[test]
 fn text_values_have_their_declared_type() {
     let head =
         "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty double y\nproperty uchar z\nend_header\n";
