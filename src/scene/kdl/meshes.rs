@@ -133,6 +133,7 @@ pub fn add_looks(
     let first = description.textures.len() as u32;
     let file_name = file.file_name().unwrap_or_default().to_string_lossy();
     let mut taken: HashSet<String> = description.materials.iter().map(|m| m.name.clone()).collect();
+    let mut renamed = HashMap::new();
     for mut material in looks.materials {
         if declared(&material.name) {
             continue;
@@ -141,14 +142,18 @@ pub fn add_looks(
             let own = format!("{} ({file_name})", material.name);
             let numbered = (2..).map(|n| format!("{own} {n}"));
             let free = std::iter::once(own.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(own);
-            for group in mesh.groups.iter_mut().filter(|g| g.material == material.name) {
-                group.material.clone_from(&free);
-            }
-            material.name = free;
+            renamed.insert(std::mem::replace(&mut material.name, free.clone()), free);
         }
         material.textures.uses_mut().for_each(|used| used.texture += first);
         taken.insert(material.name.clone());
         description.materials.push(material);
+    }
+    if !renamed.is_empty() {
+        for group in &mut mesh.groups {
+            if let Some(name) = renamed.get(&group.material) {
+                group.material.clone_from(name);
+            }
+        }
     }
     description.textures.extend(looks.textures);
     description.warnings.extend(looks.warnings.into_iter().map(|what| format!("{file_name}: {what}")));

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::facets::Facets;
 use super::rounding::Rounding;
-use super::runs::Runs;
+use super::runs::{self, Runs};
 use super::{Kinds, Object, Totals, World, instances, joined, primitives, successor};
 use crate::bvh::BuildSettings;
 use crate::error::Result;
@@ -79,7 +79,8 @@ impl<S: Real> World<S> {
         }
         let instances = instances::all(&traced.placements, &objects);
         let (top, top_leaves, unbounded_instances) = instances::upper_tree(&instances, settings.preset);
-        let runs: Vec<Runs> = assembly.objects.iter().map(|o| Runs::new(o, description)).collect();
+        let materials = runs::by_name(description);
+        let runs: Vec<Runs> = assembly.objects.iter().map(|o| Runs::new(o, &materials)).collect();
         let facets = assembly.objects.iter().zip(&runs).map(|(o, runs)| Facets::new(o, runs)).collect();
         let rounding = Rounding::of(&traced.placements, &objects);
         let kinds = objects.iter().map(Object::kinds).fold(Kinds::default(), |a, b| Kinds {

@@ -1,5 +1,7 @@
 //! Which part and which material a primitive belongs to, and where shapes stand.
 
+use std::collections::HashMap;
+
 use glam::{DAffine3, DVec3};
 
 use crate::lanes::{Lanes, Lanes3, dot, each};
@@ -79,9 +81,9 @@ pub struct Runs {
 }
 
 impl Runs {
-    /// The runs of `object`, which has at least one primitive.
-    pub fn new(object: &AssemblyObject, description: &Description) -> Self {
-        let list = list(object, description);
+    /// The runs of `object`, which has at least one primitive; `materials` are those that meshes name ([`by_name`]).
+    pub fn new(object: &AssemblyObject, materials: &HashMap<&str, u32>) -> Self {
+        let list = list(object, materials);
         let mut shift = 0;
         while (object.prim_count >> shift) as usize > 4 * list.len() {
             shift += 1;
@@ -139,8 +141,17 @@ pub fn place(object: &AssemblyObject, run: &Run) -> Option<Place> {
     }
 }
 
-fn list(object: &AssemblyObject, description: &Description) -> Vec<Run> {
-    let named = |name: &str| description.materials.iter().position(|m| m.name == name).map(|i| i as u32);
+/// The materials of `description` by name, of several with one name the first.
+pub fn by_name(description: &Description) -> HashMap<&str, u32> {
+    let mut found = HashMap::with_capacity(description.materials.len());
+    for (material, number) in description.materials.iter().zip(0..) {
+        found.entry(material.name.as_str()).or_insert(number);
+    }
+    found
+}
+
+fn list(object: &AssemblyObject, materials: &HashMap<&str, u32>) -> Vec<Run> {
+    let named = |name: &str| materials.get(name).copied();
     let mut runs = Vec::new();
     for (number, part) in object.parts.iter().enumerate() {
         let mut push = |first: u32, material: Option<u32>| {
@@ -169,6 +180,7 @@ fn list(object: &AssemblyObject, description: &Description) -> Vec<Run> {
 mod tests {
     use super::*;
     use crate::scene::assembly::Part;
+    use crate::scene::material::Material;
     use crate::scene::mesh::{Mesh, MeshGroup};
 
     #[test]
@@ -185,12 +197,33 @@ mod tests {
             object.parts.push(Part { first_prim, prim_count: count, to_object, material: None, kind });
             object.prim_count += count;
         }
-        let runs = Runs::new(&object, &Description::new("runs"));
+        let runs = Runs::new(&object, &by_name(&Description::new("runs")));
         for prim in 0..object.prim_count {
             let plain = runs.list()[runs.list().partition_point(|run| run.first <= prim) - 1];
             assert_eq!(runs.of(prim), plain);
             let part = &object.parts[plain.part as usize];
             assert!(part.first_prim <= prim && prim < part.first_prim + part.prim_count);
         }
+    }
+
+    #[test]
+    fn groups_find_the_first_material_of_their_name_in_linear_time() {
+        const COUNT: u32 = 200_000;
+        let mut description = Description::new("named");
+        let named = |i: u32| Material { name: format!("m{i}"), ..Material::default() };
+        description.materials.extend((0..COUNT).chain([0, 1]).map(named));
+        let group = |i: u32| MeshGroup { first: i, count: 1, material: format!("m{i}"), ..MeshGroup::default() };
+        let triangles = vec![[0; 3]; COUNT as usize + 1];
+        let mesh = Mesh { triangles, groups: (0..=COUNT).map(group).collect(), ..Mesh::default() };
+        let (prim_count, to_object, kind) = (COUNT + 1, DAffine3::IDENTITY, PartKind::Mesh(mesh.into()));
+        let parts = vec![Part { first_prim: 0, prim_count, to_object, material: None, kind }];
+        let object = AssemblyObject { parts, prim_count, ..AssemblyObject::default() };
+        let start = std::time::Instant::now();
+        let runs = Runs::new(&object, &by_name(&description));
+        assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
+        // Behind the default material; the last name is nobody's.
+        let first = description.materials.len() as u32 - COUNT - 2;
+        assert!((0..COUNT).all(|i| runs.of(i).material == first + i));
+        assert_eq!(runs.of(COUNT).material, 0);
     }
 }
