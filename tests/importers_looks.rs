@@ -119,6 +119,7 @@ fn what_is_missing_is_a_warning_and_what_is_damaged_an_error() {
     };
     let scene = open(&with("map_Kd gone.png\nmap_Ke text.png\nmap_d ../x.png", "text.png", b"TGA?"), "m.obj").unwrap();
     assert_eq!((named(&scene, "m").diffuse, scene.textures.len()), (DVec3::splat(0.5), 0));
+    assert_eq!(named(&scene, "m").emission, DVec3::ZERO, "a picture that is missing does not shine");
     let all = scene.warnings.join("\n");
     for what in [
         "m.obj: cannot open `gone.mtl`",

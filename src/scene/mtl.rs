@@ -83,6 +83,11 @@ pub struct Map {
 }
 
 impl Entry {
+    /// The emission as written, without its map.
+    pub fn emission(&self) -> DVec3 {
+        self.emission.max(DVec3::ZERO)
+    }
+
     /// The material, without textures.
     pub fn material(&self) -> Material {
         let mut diffuse = self.diffuse.unwrap_or(DVec3::splat(0.8)).clamp(DVec3::ZERO, DVec3::ONE);
@@ -94,7 +99,11 @@ impl Entry {
         let ior = self.ior.filter(|&ior| ior > 1.0).unwrap_or(IOR);
         let from_exponent = |absent: f64| self.exponent.map_or(absent, |n| (2.0 / (n.max(0.0) + 2.0)).powf(0.25));
         let mut material = Material { name: self.name.clone(), diffuse, ..Material::default() };
-        material.emission = self.emission.max(DVec3::ZERO);
+        material.emission = self.emission();
+        if self.emission_map.is_some() && material.emission == DVec3::ZERO {
+            // The same: a picture of light alone is meant to shine.
+            material.emission = DVec3::ONE;
+        }
         let is_glass = matches!(self.illumination, Some(6 | 7)) && self.opacity_map.is_none();
         let (is_rough_map, is_metal_map) = (self.roughness_map.is_some(), self.metallic_map.is_some());
         if self.roughness.is_some() || self.metallic.is_some() || is_rough_map || is_metal_map {
@@ -342,6 +351,9 @@ mod tests {
         }
         assert_eq!(material("map_d a.png").alpha, Alpha::Blend);
         assert_eq!(material("Kd 0 0 0\nmap_Kd a.png").diffuse, DVec3::ONE);
+        for (text, emission) in [("", 1.0), ("Ke 0 0 0\n", 1.0), ("Ke 2\n", 2.0)] {
+            assert_eq!(material(&format!("{text}map_Ke a.png")).emission, DVec3::splat(emission), "{text}");
+        }
     }
 
     #[test]

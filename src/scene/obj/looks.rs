@@ -137,6 +137,10 @@ impl Reader<'_> {
         looks.normal_scale = entry.normal_map.as_ref().map_or(1.0, |map| map.multiplier);
         looks.base = texture(&entry.base_map, Use::Colour);
         looks.emission = texture(&entry.emission_map, Use::Colour);
+        if looks.emission.is_none() {
+            // A picture that is missing is no lamp.
+            material.emission = entry.emission();
+        }
         looks.opacity = texture(&entry.opacity_map, Use::Opacity);
         looks.metallic_roughness = texture(&entry.roughness_map, Use::Roughness);
         looks.metallic = texture(&entry.metallic_map, Use::Metallic);
