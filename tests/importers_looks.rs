@@ -112,7 +112,8 @@ fn roughness_and_metal_have_pictures() {
 
 #[test]
 fn what_is_missing_is_a_warning_and_what_is_damaged_an_error() {
-    let obj = format!("mtllib a.mtl gone.mtl ../up.mtl\n{SQUARE}usemtl m\n{FACE}f 1/9 2/1 3/1\n");
+    let obj =
+        format!("mtllib a.mtl gone.mtl ../up.mtl\n{SQUARE}usemtl m\n{FACE}f 1/9 2/1 3/1\ns 1\nl 1 2\nsurf 0 1\nend");
     let library = |maps: &str| format!("newmtl m\nKa 1 1 1\nKd 0.5 0.5 0.5\n{maps}");
     let with = |maps: &str, name: &str, content: &[u8]| {
         folder(&[("m.obj", obj.as_bytes()), ("a.mtl", library(maps).as_bytes()), (name, content)])
@@ -127,6 +128,7 @@ fn what_is_missing_is_a_warning_and_what_is_damaged_an_error() {
         "m.obj: cannot open `gone.png`",
         "m.obj: `text.png` is not a PNG, JPEG, Radiance HDR or EXR picture; done without",
         "m.obj: `../x.png` leaves the scene's folder; done without",
+        "m.obj: 2 statements of the file are not read, the first is `surf` (line 16)",
         "m.obj: 1 corners name texture coordinates or normals that are not there",
         "m.obj: 1 statements or options of material libraries are not read",
     ] {

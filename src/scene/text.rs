@@ -75,13 +75,7 @@ pub(super) fn is_padding(bytes: &[u8]) -> bool {
 /// The error `what` at byte `at` of a text file, as line and column and with the line if it is short enough.
 pub(super) fn error_at(file: &Path, bytes: &[u8], at: usize, what: impl Into<String>) -> Error {
     let at = at.min(bytes.len());
-    let (mut line, mut start) = (1, 0);
-    for (i, &b) in bytes[..at].iter().enumerate() {
-        if b == b'\n' || (b == b'\r' && bytes.get(i + 1) != Some(&b'\n')) {
-            line += 1;
-            start = i + 1;
-        }
-    }
+    let (line, start) = line_at(bytes, at);
     // Characters are counted as UTF-8 lead bytes: right for text, harmless for anything else.
     let column = 1 + bytes[start..at].iter().filter(|&&b| b & 0xc0 != 0x80).count() as u64;
     let error = Error::at_line(file, line, column, what);
@@ -91,6 +85,18 @@ pub(super) fn error_at(file: &Path, bytes: &[u8], at: usize, what: impl Into<Str
     let window = &bytes[start..bytes.len().min(start + 4 * SHOWN_COLUMNS as usize)];
     let end = window.iter().position(|&b| is_newline(b)).unwrap_or(window.len());
     error.with_line_text(&String::from_utf8_lossy(&window[..end]))
+}
+
+/// The line, from 1 on, that byte `at` of a text is in, and where it begins.
+fn line_at(bytes: &[u8], at: usize) -> (u64, usize) {
+    let (mut line, mut start) = (1, 0);
+    for (i, &b) in bytes[..at].iter().enumerate() {
+        if b == b'\n' || (b == b'\r' && bytes.get(i + 1) != Some(&b'\n')) {
+            line += 1;
+            start = i + 1;
+        }
+    }
+    (line, start)
 }
 
 /// A cursor over the words of a text. A backslash at the end of a line joins it with the next one.
@@ -152,6 +158,11 @@ impl<'a> Words<'a> {
             joined.extend_from_slice(word.bytes);
         }
         name(&joined)
+    }
+
+    /// The line that byte `at` is in.
+    pub fn line(&self, at: usize) -> u64 {
+        line_at(self.bytes, at.min(self.bytes.len())).0
     }
 
     /// An error at byte `at`.

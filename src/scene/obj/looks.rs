@@ -59,6 +59,10 @@ pub fn read(file: &Path, obj: &ObjFile, references: &References<'_>) -> Result<L
             }
         }
     }
+    if let Some((first, line)) = &obj.first_ignored {
+        let what = format!("{} statements of the file are not read, the first is {first} (line {line})", obj.ignored);
+        reader.out.warnings.push(what);
+    }
     if obj.dangling > 0 {
         let what = format!("{} corners name texture coordinates or normals that are not there", obj.dangling);
         reader.out.warnings.push(what);

@@ -1,7 +1,7 @@
 //! Wavefront OBJ: polygons with texture coordinates and normals, groups and material names.
 //!
 //! Source: Alias|Wavefront, "Object Files (.obj)", appendix B1 of the Advanced Visualizer manual, 1995. Read are
-//! `v` (with an optional weight or colour, both ignored), `vt` (its first two numbers), `vn`, `f` in all four index
+//! `v` (with an optional weight or colour, both ignored), `vt` (its first two numbers), `vn`, `f` (once called `fo`) in all four index
 //! forms with positive and negative indices, `g`, `o`, `usemtl` and `mtllib`; `vp`, `s`, `l` and `p` are passed over;
 //! other keywords (free-form curves among them) are passed over and counted. A face may name vertices that come later
 //! in the file. Indices of `vt` and `vn` that name nothing are counted: such a corner has none.
@@ -39,6 +39,8 @@ pub struct ObjFile {
     pub material_libs: Vec<String>,
     /// Statements without effect: unknown keywords and faces with fewer than three corners.
     pub ignored: u64,
+    /// The first of them for a message, and its line.
+    pub first_ignored: Option<(String, u64)>,
     /// Corners whose texture coordinates or normal the file does not have.
     pub dangling: u64,
     /// Polygons that are fanned although they are not convex, because they have thousands of corners.
@@ -101,7 +103,7 @@ impl<'a> Reader<'a> {
             b"v" => return self.vertex(),
             b"vt" => return self.coordinates(),
             b"vn" => return self.normal(),
-            b"f" => return self.face(),
+            b"f" | b"fo" => return self.face(keyword),
             b"g" | b"o" => self.start_run(false),
             b"usemtl" => self.start_run(true),
             b"mtllib" => self.material_lib(),
@@ -109,12 +111,20 @@ impl<'a> Reader<'a> {
             [b'#', ..] => _ = self.words.rest_of_line(),
             b"vp" | b"s" | b"l" | b"p" => self.pass_over(),
             _ => {
-                self.out.ignored += 1;
+                self.ignore(keyword.at, keyword.shown());
                 self.unknown.get_or_insert(keyword);
                 self.pass_over();
             }
         }
         Ok(())
+    }
+
+    /// Counts the statement at byte `at`, which is called `what`, as without effect.
+    fn ignore(&mut self, at: usize, what: String) {
+        self.out.ignored += 1;
+        if self.out.first_ignored.is_none() {
+            self.out.first_ignored = Some((what, self.words.line(at)));
+        }
     }
 
     fn pass_over(&mut self) {
@@ -174,7 +184,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn face(&mut self) -> Result<()> {
+    fn face(&mut self, keyword: Word<'a>) -> Result<()> {
         let (mut first, mut last, mut corners) = (Corner::default(), Corner::default(), 0_usize);
         let (start, mut highest) = (self.out.mesh.triangles.len(), 0);
         while let Some(word) = self.words.next_value() {
@@ -203,7 +213,9 @@ impl<'a> Reader<'a> {
                 self.polygons.later.push([start as u32, end as u32]);
             }
         }
-        self.out.ignored += u64::from(corners < 3);
+        if corners < 3 {
+            self.ignore(keyword.at, format!("{} of {corners} corners", keyword.shown()));
+        }
         Ok(())
     }
 

@@ -117,6 +117,10 @@ fn odd_but_valid() {
     assert_eq!(out.mesh.positions[0].y, f64::NEG_INFINITY);
     assert_eq!(out.mesh.positions[1], DVec3::new(0.5, 5.0, 1e-3));
     assert_eq!(out.ignored, 3, "curv, surf and a face of two corners");
+    assert_eq!(out.first_ignored, Some(("`curv`".into(), 7)));
+    let out = read("# a\r\nv 0 0 0\r\nfo 1 1 1\r\ns 1\r\nf 1 1\r\nsurf\r\n");
+    assert_eq!((out.mesh.triangles.len(), out.ignored), (1, 2), "an `fo` of old files is an `f`");
+    assert_eq!(out.first_ignored, Some(("`f` of 2 corners".into(), 5)));
 }
 
 #[test]
