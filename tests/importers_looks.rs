@@ -57,7 +57,7 @@ fn an_obj_file_brings_its_materials_and_textures() {
         ("bumps.png", &bumps),
     ]);
     let scene = open(&folder, "m.obj").unwrap();
-    assert_eq!(scene.warnings, [""; 0]);
+    assert_eq!(scene.warnings, ["m.obj: no library has the materials `nowhere`; done with the default one"]);
     let floor = named(&scene, "floor");
     assert_eq!(floor.diffuse, DVec3::new(0.5, 0.25, 1.0), "the first definition counts");
     let base = floor.textures.base.unwrap();
@@ -167,6 +167,24 @@ fn scene_files_take_over_materials_and_have_the_last_word() {
     // Opened by itself, the file's folder is the scene's.
     let alone = open(&folder, "one/m.obj").unwrap();
     assert!(alone.warnings.join("\n").contains("`../red.png` leaves the scene's folder"), "{:?}", alone.warnings);
+}
+
+#[test]
+fn materials_that_nobody_has_are_named() {
+    let uses: String = (0..12).map(|i| format!("usemtl m{}\n{FACE}", i % 11)).collect();
+    let obj = format!("mtllib m.mtl\n{SQUARE}{FACE}{uses}");
+    let scene_file = b"mesh \"m.obj\"\nmaterial \"m1\" { diffuse 0 0 0.5 }";
+    let files = [("s.kdl", &scene_file[..]), ("m.obj", obj.as_bytes()), ("m.mtl", b"newmtl m3\n"), ("n.obj", b"")];
+    let folder = folder(&files);
+    let scene = open(&folder, "s.kdl").unwrap();
+    let names = "`m0`, `m2`, `m4`, `m5`, `m6`, `m7`, `m8`, `m9` and 1 others";
+    let expected = format!("m.obj: no library has the materials {names}; done with the default one");
+    assert_eq!(scene.warnings, [expected], "m1 is the scene's own, m3 the library's");
+    std::fs::write(folder.path().join("s.kdl"), "material \"a\"\nmesh \"m.obj\" material=\"a\"").unwrap();
+    assert_eq!(open(&folder, "s.kdl").unwrap().warnings, [""; 0], "names do not matter");
+    // Who names no library wants none.
+    std::fs::write(folder.path().join("n.obj"), obj.replace("mtllib m.mtl\n", "")).unwrap();
+    assert_eq!(open(&folder, "n.obj").unwrap().warnings, [""; 0]);
 }
 
 #[test]

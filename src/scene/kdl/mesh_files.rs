@@ -18,15 +18,16 @@ impl<'a, 'n> Lowering<'a, 'n> {
     /// # Errors
     /// The first thing that is wrong in the statement or the file.
     pub fn mesh_file(&mut self, node: &'n Node<'a>, place: Place) -> Result<()> {
-        let (mesh, scale, place) = self.mesh_of(node, place)?;
+        let (mesh, scale, place) = self.mesh_of(node, place, true)?;
         self.add(ItemKind::Mesh(mesh), scale, place, node.span)
     }
 
-    /// The mesh of a `mesh` statement, the scale of its unit, where it goes.
+    /// The mesh of a `mesh` statement, the scale of its unit, where it goes; `has_names` says whether the file's names of materials
+    /// matter where the statement gives none.
     ///
     /// # Errors
     /// The first thing that is wrong in the statement or the file.
-    pub fn mesh_of(&mut self, node: &'n Node<'a>, place: Place) -> Result<(u32, DAffine3, Place)> {
+    pub fn mesh_of(&mut self, node: &'n Node<'a>, place: Place, has_names: bool) -> Result<(u32, DAffine3, Place)> {
         const ALLOWED: [&str; 2] = ["units", "material"];
         let fields = self.fields(node, &ALLOWED, &transform::NAMES)?;
         let (written, span) = fields.title()?.ok_or_else(|| fields.error("expected `mesh \"file.ply\"`"))?;
@@ -43,22 +44,25 @@ impl<'a, 'n> Lowering<'a, 'n> {
         drop(fields);
         let mesh = match self.store.find(&Key::Written(written.into())) {
             Some(mesh) => mesh,
-            None => self.read_mesh(written, span)?,
+            None => self.read_mesh(written, span, has_names && place.parts().1.is_none())?,
         };
         Ok((mesh, DAffine3::from_scale(glam::DVec3::splat(scale)), place))
     }
 
-    fn read_mesh(&mut self, written: &str, span: Span) -> Result<u32> {
+    fn read_mesh(&mut self, written: &str, span: Span, has_names: bool) -> Result<u32> {
         let source = self.scope.source;
         let file = self.files.resolve(written).map_err(|what| source.error(span, what))?;
         let key = Key::File(file.clone());
         let mesh = match self.store.find(&key) {
             Some(mesh) => mesh,
             None => {
-                let read = (self.files.read)(&file).map_err(|e| match e {
+                let mut read = (self.files.read)(&file).map_err(|e| match e {
                     Error::Io { source: e, .. } => source.error(span, format!("cannot read {}: {e}", quote(written))),
                     other => other,
                 })?;
+                if !has_names {
+                    read.looks.unknown.clear();
+                }
                 self.add_mesh(key, &file, read)
             }
         };

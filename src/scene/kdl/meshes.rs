@@ -7,9 +7,10 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::scene::description::{Description, Material};
 use crate::scene::mesh::Mesh;
-use crate::scene::obj::looks::Looks;
+use crate::scene::obj::looks::{Looks, NAMED};
 use crate::scene::reference::{Found, References};
 use crate::scene::solids::flat::closed;
+use crate::scene::text::shown;
 
 /// Most triangles that generators and polygons of one document may make.
 pub const MAX_GENERATED: u64 = 1 << 24;
@@ -156,7 +157,20 @@ pub fn add_looks(
         }
     }
     description.textures.extend(looks.textures);
-    description.warnings.extend(looks.warnings.into_iter().map(|what| format!("{file_name}: {what}")));
+    let unknown = looks.unknown.iter().filter(|name| !declared(name) && !taken.contains(*name));
+    let warnings = looks.warnings.into_iter().chain(unknown_materials(unknown.map(String::as_str).collect()));
+    description.warnings.extend(warnings.map(|what| format!("{file_name}: {what}")));
+}
+
+/// The warning about materials called `names`; none if there are none.
+fn unknown_materials(names: Vec<&str>) -> Option<String> {
+    let shown: Vec<_> = names.iter().take(NAMED).map(|name| shown(name.as_bytes())).collect();
+    let more = match names.len().saturating_sub(NAMED) {
+        0 => String::new(),
+        more => format!(" and {more} others"),
+    };
+    let what = format!("no library has the materials {}{more}; done with the default one", shown.join(", "));
+    (!names.is_empty()).then_some(what)
 }
 
 /// Gives every material name that meshes use and `description` lacks the default look.

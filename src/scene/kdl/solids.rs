@@ -85,7 +85,7 @@ impl<'a, 'n> Lowering<'a, 'n> {
             "instance" => self.solid_instance(node, building),
             "group" => self.operation(node, building),
             "mesh" => {
-                let (mesh, scale, place) = self.mesh_of(node, Place::root_of(0))?;
+                let (mesh, scale, place) = self.mesh_of(node, Place::root_of(0), false)?;
                 self.count_item(node.span)?;
                 self.store.check_closed(mesh).map_err(|what| {
                     let file = node.title().map_or("", |(name, _)| name);

@@ -22,8 +22,8 @@ use crate::scene::reference::References;
 use crate::scene::text;
 use crate::scene::texture::{Texels, Texture};
 
-/// Most missing files that warnings name.
-const NAMED: usize = 8;
+/// Most missing files, or materials, that warnings name.
+pub(in crate::scene) const NAMED: usize = 8;
 
 /// Materials by name, with their textures.
 #[derive(Clone, Debug, Default)]
@@ -34,6 +34,8 @@ pub struct Looks {
     pub textures: Vec<Arc<Texture>>,
     /// SHA-256 of each library and picture read.
     pub digests: Vec<[u8; 32]>,
+    /// Materials that the mesh uses and no library has, where libraries are named; a scene may have them.
+    pub unknown: Vec<String>,
     /// What is missing or was passed over.
     pub warnings: Vec<String>,
 }
@@ -58,6 +60,12 @@ pub fn read(file: &Path, obj: &ObjFile, references: &References<'_>) -> Result<L
                 reader.out.materials.push(material);
             }
         }
+    }
+    if !obj.material_libs.is_empty() {
+        // In the order of their first use, each once; no name is the default look.
+        known.insert(String::new());
+        let names = obj.mesh.groups.iter().map(|group| &group.material);
+        reader.out.unknown.extend(names.filter(|name| known.insert((*name).clone())).cloned());
     }
     if let Some((first, line)) = &obj.first_ignored {
         let what = format!("{} statements of the file are not read, the first is {first} (line {line})", obj.ignored);
