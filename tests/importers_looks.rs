@@ -180,11 +180,38 @@ fn materials_that_nobody_has_are_named() {
     let names = "`m0`, `m2`, `m4`, `m5`, `m6`, `m7`, `m8`, `m9` and 1 others";
     let expected = format!("m.obj: no library has the materials {names}; done with the default one");
     assert_eq!(scene.warnings, [expected], "m1 is the scene's own, m3 the library's");
-    std::fs::write(folder.path().join("s.kdl"), "material \"a\"\nmesh \"m.obj\" material=\"a\"").unwrap();
+    std::fs::write(folder.path().join("s.kdl"), "material \"a\" { diffuse 1 0 0 }\nmesh \"m.obj\" material=\"a\"")
+        .unwrap();
     assert_eq!(open(&folder, "s.kdl").unwrap().warnings, [""; 0], "names do not matter");
     // Who names no library wants none.
     std::fs::write(folder.path().join("n.obj"), obj.replace("mtllib m.mtl\n", "")).unwrap();
     assert_eq!(open(&folder, "n.obj").unwrap().warnings, [""; 0]);
+}
+
+#[test]
+fn colours_of_vertices_are_said_not_to_be_read() {
+    let corners = ["0 0 0", "1 0 0", "0 1 0"];
+    let [plain, coloured] =
+        ["", " 1 0.5 0"].map(|colour| corners.map(|c| format!("v {c}{colour}\n")).concat() + "f 1 2 3\n");
+    let ply = |names: [&str; 3]| {
+        let colours = names.map(|name| format!("property uchar {name}\n")).concat();
+        let rows = corners.map(|c| format!("{c} 255 0 9\n")).concat();
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{colours}\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n{rows}3 0 1 2\n"
+        )
+    };
+    let (red, other) = (ply(["red", "green", "blue"]), ply(["a", "b", "c"]));
+    let files = [("a.obj", &plain), ("b.obj", &coloured), ("a.ply", &other), ("b.ply", &red)];
+    let folder = folder(&files.map(|(name, text)| (name, text.as_bytes())));
+    for name in ["a.obj", "a.ply"] {
+        assert_eq!(open(&folder, name).unwrap().warnings, [""; 0], "{name}");
+    }
+    for name in ["b.obj", "b.ply"] {
+        let scene = open(&folder, name).unwrap();
+        assert_eq!(scene.warnings, [format!("{name}: the colours of vertices are not read")]);
+        assert_eq!(scene.meshes[0].triangles, [[0, 1, 2]]);
+    }
 }
 
 #[test]

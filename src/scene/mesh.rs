@@ -4,6 +4,9 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+/// What users are told of a file that has them: meshes keep none.
+pub(super) const COLOURS: &str = "the colours of vertices are not read";
+
 /// An indexed triangle mesh. Positions keep the file's values (f32 files widen exactly), indices the file's order
 /// and winding; nothing is dropped here, so triangle `i` of the mesh is triangle `i` of the file (polygons are
 /// made of triangles in place).

@@ -15,6 +15,7 @@ use sha2::{Digest, Sha256};
 use super::{ObjFile, heights};
 use crate::error::{Error, Result};
 use crate::scene::material::{Material, TextureId, TextureRef, Wrap};
+use crate::scene::mesh::COLOURS;
 use crate::scene::mtl::{self, Entry, Map};
 use crate::scene::pictures::{Content, Curve, Picture, decode_all, is_known};
 use crate::scene::polygon;
@@ -71,6 +72,7 @@ pub fn read(file: &Path, obj: &ObjFile, references: &References<'_>) -> Result<L
         let what = format!("{} statements of the file are not read, the first is {first} (line {line})", obj.ignored);
         reader.out.warnings.push(what);
     }
+    reader.out.warnings.extend(obj.has_colours.then(|| COLOURS.to_owned()));
     if obj.dangling > 0 {
         let what = format!("{} corners name texture coordinates or normals that are not there", obj.dangling);
         reader.out.warnings.push(what);

@@ -43,6 +43,8 @@ pub struct ObjFile {
     pub first_ignored: Option<(String, u64)>,
     /// Corners whose texture coordinates or normal the file does not have.
     pub dangling: u64,
+    /// Whether vertices have colours, which are not kept.
+    pub has_colours: bool,
     /// Polygons that are fanned although they are not convex, because they have thousands of corners.
     pub large_polygons: u64,
 }
@@ -148,6 +150,7 @@ impl<'a> Reader<'a> {
         if self.out.mesh.positions.len() >= MAX_COUNT {
             return Err(self.words.missing("more than 2^32 - 2 vertices"));
         }
+        self.out.has_colours |= count >= 6;
         self.out.mesh.positions.push(DVec3::new(numbers[0], numbers[1], numbers[2]));
         Ok(())
     }

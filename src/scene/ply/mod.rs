@@ -19,7 +19,7 @@ use glam::DVec3;
 
 use self::header::{Element, Format, Kind};
 use self::values::{Binary, Text, Values};
-use super::mesh::Mesh;
+use super::mesh::{COLOURS, Mesh};
 use super::polygon::{self, Polygons};
 use crate::error::Result;
 
@@ -90,7 +90,9 @@ fn read_body<V: Values>(elements: &[Element], mut values: V) -> Result<PlyFile> 
     for [start, end] in std::mem::take(&mut body.polygons.later) {
         body.cut(start as usize, end as usize);
     }
-    let warnings = polygon::warning(body.polygons.large).into_iter().collect();
+    let is_coloured = ["red", "green", "blue"].iter().all(|name| vertices.properties.iter().any(|p| p.name == *name));
+    let colours = is_coloured.then(|| COLOURS.to_owned());
+    let warnings = colours.into_iter().chain(polygon::warning(body.polygons.large)).collect();
     Ok(PlyFile { mesh: body.mesh, warnings })
 }
 
