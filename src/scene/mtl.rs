@@ -384,6 +384,7 @@ mod tests {
             ("newmtl a\nKd 1 2", "m.mtl:2:7: expected one number or three, found 2"),
             ("newmtl a\nKd 1 2 3 4", "m.mtl:2:10: expected the end of the line: a colour has three numbers"),
             ("newmtl a\nNs inf", "m.mtl:2:4: expected a finite number, found `inf`"),
+            ("newmtl a\nNs 1.#IND", "m.mtl:2:4: expected a finite number, found `1.#IND`"),
             ("newmtl a\nNi", "m.mtl:2:3: expected a number"),
             ("newmtl a\nmap_Kd -s 1 1", "m.mtl:2:14: expected the name of a file"),
             ("newmtl a\nmap_Kd -bm", "m.mtl:2:11: expected a number after `-bm`"),

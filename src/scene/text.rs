@@ -20,14 +20,36 @@ pub(super) struct Word<'a> {
 }
 
 impl Word<'_> {
-    /// The word as a number, if it is one (`nan` and `inf` are).
+    /// The word as a number, if it is one (`nan` and `inf` are, also as Microsoft's libraries print them).
     pub fn float<F: std::str::FromStr>(&self) -> Option<F> {
-        std::str::from_utf8(self.bytes).ok()?.parse().ok()
+        let text = std::str::from_utf8(self.bytes).ok()?;
+        text.parse().ok().or_else(|| microsoft(text)?.parse().ok())
     }
 
     /// The word for an error message: quoted, cut to 40 characters.
     pub fn shown(&self) -> String {
         shown(self.bytes)
+    }
+}
+
+/// The usual word for what Microsoft's C libraries print where a number is none: `-nan(ind)`, before 2015 `-1.#IND`, which a
+/// precision may cut (`1.#QO`, `1.#J`).
+#[cold]
+fn microsoft(text: &str) -> Option<&'static str> {
+    if text.len() > 16 {
+        return None;
+    }
+    let is_negative = text.starts_with('-');
+    let text = text.trim_start_matches(['+', '-']).to_ascii_uppercase();
+    if ["NAN(IND)", "NAN(SNAN)"].contains(&text.as_str()) {
+        return Some("nan");
+    }
+    let kind = text.strip_prefix("1.#")?.trim_end_matches('0');
+    match kind {
+        "INF" | "J" if is_negative => Some("-inf"),
+        "INF" | "J" => Some("inf"),
+        "IND" | "IN" | "IO" | "QNAN" | "QNA" | "QN" | "QO" | "SNAN" | "SNA" | "SN" | "SO" => Some("nan"),
+        _ => None,
     }
 }
 
@@ -232,6 +254,19 @@ mod tests {
         assert_eq!(place(b"ab\rcd", 3), "f:2:1: x");
         assert_eq!(place("é x".as_bytes(), 3), "f:1:3: x");
         assert_eq!(place(b"", 9), "f:1:1: x");
+    }
+
+    #[test]
+    fn what_is_no_number_has_many_spellings() {
+        let float = |text: &str| Word { at: 0, bytes: text.as_bytes() }.float::<f64>();
+        for text in ["nan", "-nan", "-nan(ind)", "nan(snan)", "1.#IND", "-1.#IND00", "1.#QNAN", "1.#QNAN0", "1.#QO"] {
+            assert!(float(text).is_some_and(f64::is_nan), "{text}");
+        }
+        let infinite = ["1.#INF", "-1.#INF000", "1.#J"].map(float);
+        assert_eq!(infinite, [Some(f64::INFINITY), Some(f64::NEG_INFINITY), Some(f64::INFINITY)]);
+        for text in ["nan(", "1.#", "1.#X", "1.5#INF", "x", "-"] {
+            assert_eq!(float(text), None, "{text}");
+        }
     }
 
     #[test]

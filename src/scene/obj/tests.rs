@@ -114,6 +114,8 @@ fn odd_but_valid() {
     let out = read("f 2 3 1\nv nan -inf 1e400\nv .5 +5. 1E-3\nv 0 0 0\nl 1 2\np 1\ncurv 0 1 \\\n 2\nsurf\nf 1 2\n");
     assert_eq!(out.mesh.triangles, [[1, 2, 0]], "faces may come before their vertices");
     assert!(out.mesh.positions[0].x.is_nan());
+    let normal = read("v 0 0 0\nvn 0 -nan(ind) 1.#QNAN\nf 1//1 1//1 1//1\n").mesh.normals.values[0];
+    assert!(normal[0] == 0.0 && normal[1].is_nan() && normal[2].is_nan());
     assert_eq!(out.mesh.positions[0].y, f64::NEG_INFINITY);
     assert_eq!(out.mesh.positions[1], DVec3::new(0.5, 5.0, 1e-3));
     assert_eq!(out.ignored, 3, "curv, surf and a face of two corners");
