@@ -32,8 +32,9 @@ const MAX_VERTEX_NUMBERS: usize = 7;
 /// What an OBJ file holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjFile {
-    /// The polygons as triangles, in place: fanned from the first corner, or cut where that would not be their area. Groups have the name of the last `g` or `o` and the last `usemtl` (names run
-    /// to the end of their line and are cut to 255 bytes).
+    /// The polygons as triangles, in place: fanned from the first corner, or cut where that would not be their area.
+    /// Groups have the name of the last `g` or `o` and the last `usemtl` (names run to the end of their line and are cut to
+    /// 255 bytes).
     pub mesh: Mesh,
     /// Material libraries in the order of their `mtllib` statements, as written. None of them is opened.
     pub material_libs: Vec<String>,
@@ -222,7 +223,8 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Cuts the polygon whose fan are the triangles from `start` to `end`, if the fan is not its area.
+    /// Cuts the polygon whose fan are the triangles from `start` to `end`, if the fan is not its area. Triangles do not pay for it.
+    #[inline(never)]
     fn cut(&mut self, start: usize, end: usize) {
         let fan = &mut self.out.mesh.triangles[start..end];
         if let Some(cut) = self.polygons.cut(fan, &self.out.mesh.positions) {
