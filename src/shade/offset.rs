@@ -1,4 +1,4 @@
-//! Where rays that leave a surface start, so that they do not hit that surface again.
+//! Where rays that leave a surface start, so that they do not hit that surface again, and where rays to one end.
 //!
 //! Source: the error-bound offset of M. Pharr, W. Jakob, G. Humphreys, *Physically Based Rendering*, 4th edition,
 //! section 6.8 ("Managing Rounding Error", `OffsetRayOrigin`). It was chosen over the integer offset of C. Wächter
@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use crate::lanes::Real;
+use crate::lanes::{Lanes, Lanes3, Real};
 
 /// Roundings of the ray (origin, direction, t) between the true hit and ours, in units of S::EPSILON.
 pub(super) const RAY_ROUNDINGS: f64 = 16.0;
@@ -15,16 +15,38 @@ pub(super) const RAY_ROUNDINGS: f64 = 16.0;
 /// its distance from the eye puts its rounding errors next to the eye. (tests/render/offsets.rs: 2 leave one hit in
 /// 100 behind a surface, 4 one in 10^5.)
 pub(super) const PRIMITIVE_ROUNDINGS: f64 = 8.0;
+/// The same with those of a point that is chosen on it.
+const CHOSEN_ROUNDINGS: f64 = 14.0;
 
 /// Bound of the error of a hit point, per axis, scene units: `position` = `org + t dir` was found in precision `S`
 /// from a primitive whose coordinates reach `magnitude` (not negative). (gamma_n of Higham's analysis times what was
 /// added.)
 pub fn position_error<S: Real>(org: DVec3, dir: DVec3, t: f64, position: DVec3, magnitude: DVec3) -> DVec3 {
-    let gamma = |n: f64| {
-        let n_eps = n * S::EPSILON.to_f64();
-        n_eps / (1.0 - n_eps)
-    };
-    gamma(RAY_ROUNDINGS) * (position.abs() + org.abs() + (dir * t).abs()) + gamma(PRIMITIVE_ROUNDINGS) * magnitude
+    let of_ray = gamma::<S>(RAY_ROUNDINGS);
+    of_ray * (position.abs() + org.abs() + (dir * t).abs()) + gamma::<S>(PRIMITIVE_ROUNDINGS) * magnitude
+}
+
+/// Bound of the relative error of `n` roundings in precision `S`.
+pub fn gamma<S: Real>(n: f64) -> f64 {
+    let n_eps = n * S::EPSILON.to_f64();
+    n_eps / (1.0 - n_eps)
+}
+
+/// The part of [`end_error`] that only depends on the primitive, whose coordinates are a vector of length `magnitude`
+/// at most.
+pub fn chosen_error<S: Real>(magnitude: f64) -> f64 {
+    gamma::<S>(CHOSEN_ROUNDINGS) * magnitude
+}
+
+/// How far off a surface, along its unit normal `normal`, rays in precision `S` from near `from` to the point `to` of it
+/// must end so as not to meet it. A bound that knows the distance only would not do: what is rounded are the
+/// coordinates, which may be large against it. `chosen`: see [`chosen_error`].
+#[inline(always)]
+pub fn end_error<S: Real, V: Lanes>(from: Lanes3<V>, to: Lanes3<V>, normal: Lanes3<V>, chosen: V) -> V {
+    // The distance is no longer than both positions together; two more for these themselves.
+    let of_ray = V::constant(gamma::<S>(2.0 * RAY_ROUNDINGS + 2.0));
+    let along = |i: usize| normal[i].abs() * (from[i].abs() + to[i].abs());
+    of_ray.mul_add(along(0) + along(1) + along(2), chosen)
 }
 
 /// Origin in precision `S` of a ray that leaves `position` to the side that the unit normal `normal` points to:

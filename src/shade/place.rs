@@ -1,8 +1,8 @@
 //! Where rays meet surfaces, in lanes: the point, the normal, and how far from the point a ray that leaves it must start.
 
-use super::offset::{PRIMITIVE_ROUNDINGS, RAY_ROUNDINGS};
+use super::offset::{self, PRIMITIVE_ROUNDINGS, RAY_ROUNDINGS};
 use crate::lanes::space::{choose, cross, normalize};
-use crate::lanes::{LaneMask, Lanes, Lanes3, Real, dot, each, map3};
+use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::scene::world::Met;
 
 /// Roundings of a triangle (see [`super::offset`]), with those of a hit's weights.
@@ -95,6 +95,5 @@ impl<V: Lanes> Place<V> {
 /// Bound of the relative error of `n` roundings.
 #[inline(always)]
 fn gamma<V: Lanes>(n: f64) -> V {
-    let n_eps = n * V::Scalar::EPSILON.to_f64();
-    V::constant(n_eps / (1.0 - n_eps))
+    V::constant(offset::gamma::<V::Scalar>(n))
 }

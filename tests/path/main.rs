@@ -5,6 +5,7 @@ mod path_support;
 
 mod closed_forms;
 mod furnace;
+mod lamps;
 mod looks;
 mod mitsuba;
 mod pictures;

@@ -10,6 +10,7 @@ use crate::scene::description::Light;
 use crate::scene::world::World;
 use crate::shade::lights::Spot;
 use crate::shade::look::Looks;
+use crate::shade::offset::{chosen_error, end_error};
 
 /// Something that shines.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +27,8 @@ pub enum Emitter {
         normal: DVec3,
         /// Area.
         area: f64,
+        /// Length of its [`crate::scene::world::Surface::magnitude`].
+        magnitude: f64,
         /// Material number.
         material: u32,
         /// Primitive and instance.
@@ -41,6 +44,8 @@ pub enum Emitter {
         normal: DVec3,
         /// Area.
         area: f64,
+        /// See [`Self::Triangle`].
+        magnitude: f64,
         /// Material number.
         material: u32,
         /// Primitive and instance.
@@ -52,6 +57,8 @@ pub enum Emitter {
         centre: DVec3,
         /// Radius.
         radius: f64,
+        /// See [`Self::Triangle`].
+        magnitude: f64,
         /// Material number.
         material: u32,
         /// Primitive and instance.
@@ -64,7 +71,8 @@ pub enum Emitter {
 /// Light that can arrive at a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Aim {
-    /// Where the light is, or, far away, the direction to it.
+    /// Where the light is, or, far away, the direction to it. Not quite on a surface, but so far off it that rays to
+    /// there do not meet it.
     pub target: DVec3,
     /// Whether it is infinitely far.
     pub is_far: bool,
@@ -79,26 +87,27 @@ pub struct Aim {
 }
 
 impl Emitter {
-    /// The image of a triangle with `corners`.
-    pub fn triangle(to_world: &DAffine3, corners: [DVec3; 3], material: u32, prim: u32, inst: u32) -> Self {
+    /// The image of a triangle with `corners`; its `magnitude`: see [`Self::Triangle`].
+    pub fn triangle(to_world: &DAffine3, corners: [DVec3; 3], magnitude: f64, material: u32, ids: [u32; 2]) -> Self {
         let [a, b, c] = corners.map(|p| to_world.transform_point3(p));
         // A mirroring map leaves the front where it was wound, as [`World::surface`] does.
         let cross = (b - a).cross(c - a) * to_world.matrix3.determinant().signum();
         let (normal, area) = (cross.normalize_or_zero(), 0.5 * cross.length());
-        Self::Triangle { corner: a, edges: [b - a, c - a], normal, area, material, ids: [prim, inst] }
+        Self::Triangle { corner: a, edges: [b - a, c - a], normal, area, magnitude, material, ids }
     }
 
     /// The image of the unit disc.
-    pub fn disc(to_world: &DAffine3, material: u32, ids: [u32; 2]) -> Self {
+    pub fn disc(to_world: &DAffine3, magnitude: f64, material: u32, ids: [u32; 2]) -> Self {
         let axes = [to_world.matrix3.x_axis, to_world.matrix3.y_axis];
         let cross = axes[0].cross(axes[1]);
         let mirrored = to_world.matrix3.determinant().signum();
         let normal = cross.normalize_or_zero() * mirrored;
-        Self::Disc { centre: to_world.translation, axes, normal, area: PI * cross.length(), material, ids }
+        let (centre, area) = (to_world.translation, PI * cross.length());
+        Self::Disc { centre, axes, normal, area, magnitude, material, ids }
     }
 
     /// The image of the unit sphere, if that is a sphere.
-    pub fn sphere(to_world: &DAffine3, material: u32, ids: [u32; 2]) -> Self {
+    pub fn sphere(to_world: &DAffine3, magnitude: f64, material: u32, ids: [u32; 2]) -> Self {
         let m = to_world.matrix3;
         let radius = m.x_axis.length();
         let alike = |x: f64| (x - radius).abs() <= 1e-9 * radius;
@@ -106,7 +115,7 @@ impl Emitter {
         let is_round = alike(m.y_axis.length()) && alike(m.z_axis.length());
         let is_right = right(m.x_axis.dot(m.y_axis)) && right(m.y_axis.dot(m.z_axis)) && right(m.z_axis.dot(m.x_axis));
         if is_round && is_right && radius > 0.0 {
-            Self::Sphere { centre: to_world.translation, radius, material, ids }
+            Self::Sphere { centre: to_world.translation, radius, magnitude, material, ids }
         } else {
             Self::Unaimed
         }
@@ -144,28 +153,28 @@ impl Emitter {
     pub fn aim<S: Real>(&self, from: DVec3, place: [f64; 2], world: &World<S>, looks: &Looks<'_>) -> Option<Aim> {
         match *self {
             Self::Light(light) => aim_at_light(&light, from, place),
-            Self::Triangle { corner, edges, normal, area, material, ids } => {
+            Self::Triangle { corner, edges, normal, area, magnitude, material, ids } => {
                 let [b, c] = on_triangle(place);
                 let target = corner + edges[0] * b + edges[1] * c;
-                let mut aim = planar(from, target, normal, area)?;
+                let (mut aim, facing) = planar(from, target, normal, area)?;
                 let front = normal.dot(aim.dir) < 0.0;
                 aim.radiance = radiance(looks, world, material, (target, [b, c]), front, ids);
-                Some(aim)
+                Some(aim.off_surface::<S>(from, facing, magnitude))
             }
-            Self::Disc { centre, axes, normal, area, material, ids } => {
+            Self::Disc { centre, axes, normal, area, magnitude, material, ids } => {
                 let radius = place[0].sqrt();
                 let (sin, cos) = (TAU * place[1]).sin_cos();
                 let target = centre + axes[0] * (radius * cos) + axes[1] * (radius * sin);
-                let mut aim = planar(from, target, normal, area)?;
+                let (mut aim, facing) = planar(from, target, normal, area)?;
                 let front = normal.dot(aim.dir) < 0.0;
                 aim.radiance = radiance(looks, world, material, (target, [0.0; 2]), front, ids);
-                Some(aim)
+                Some(aim.off_surface::<S>(from, facing, magnitude))
             }
-            Self::Sphere { centre, radius, material, ids } => {
-                let mut aim = aim_at_sphere(from, centre, radius, place)?;
+            Self::Sphere { centre, radius, magnitude, material, ids } => {
+                let (mut aim, facing) = aim_at_sphere(from, centre, radius, place)?;
                 let front = (aim.target - centre).dot(aim.dir) < 0.0;
                 aim.radiance = radiance(looks, world, material, (aim.target, [0.0; 2]), front, ids);
-                Some(aim)
+                Some(aim.off_surface::<S>(from, facing, magnitude))
             }
             Self::Unaimed => None,
         }
@@ -202,6 +211,15 @@ impl Emitter {
     }
 }
 
+impl Aim {
+    /// The same with the target off the surface it is on, whose unit normal on the side of `from` is `facing`.
+    fn off_surface<S: Real>(self, from: DVec3, facing: DVec3, magnitude: f64) -> Self {
+        let chosen = chosen_error::<S>(magnitude);
+        let off = end_error::<S, f64>(from.to_array(), self.target.to_array(), facing.to_array(), chosen);
+        Self { target: self.target + facing * off, ..self }
+    }
+}
+
 /// What `material` emits at a place (with the weights of a triangle's corners) of primitive and instance `ids`.
 fn radiance<S: Real>(
     looks: &Looks<'_>,
@@ -218,19 +236,16 @@ fn radiance<S: Real>(
     looks.emission(material, &surface, front) * looks.opacity(material, &surface)
 }
 
-/// Aim at `target` on a flat surface of `area`, without radiance.
-fn planar(from: DVec3, target: DVec3, normal: DVec3, area: f64) -> Option<Aim> {
+/// Aim at `target` on a flat surface of `area`, without radiance, and the normal on the side of `from`.
+fn planar(from: DVec3, target: DVec3, normal: DVec3, area: f64) -> Option<(Aim, DVec3)> {
     let away = target - from;
     let square = away.length_squared();
     let dir = away.try_normalize()?;
-    let cosine = dir.dot(normal).abs();
-    (cosine > 0.0 && area > 0.0).then(|| Aim {
-        target,
-        is_far: false,
-        dir,
-        pdf: square / (cosine * area),
-        radiance: DVec3::ZERO,
-        is_point: false,
+    let along = dir.dot(normal);
+    let facing = if along < 0.0 { normal } else { -normal };
+    (along != 0.0 && area > 0.0).then(|| {
+        let pdf = square / (along.abs() * area);
+        (Aim { target, is_far: false, dir, pdf, radiance: DVec3::ZERO, is_point: false }, facing)
     })
 }
 
@@ -247,7 +262,8 @@ fn cap(square: f64, radius: f64) -> Option<f64> {
     (sin2 < 1.0 - 1e-9).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
 }
 
-fn aim_at_sphere(from: DVec3, centre: DVec3, radius: f64, place: [f64; 2]) -> Option<Aim> {
+/// Aim at a sphere, without radiance, and its normal there on the side of `from`.
+fn aim_at_sphere(from: DVec3, centre: DVec3, radius: f64, place: [f64; 2]) -> Option<(Aim, DVec3)> {
     let to_centre = centre - from;
     let square = to_centre.length_squared();
     if let Some(height) = cap(square, radius) {
@@ -257,7 +273,8 @@ fn aim_at_sphere(from: DVec3, centre: DVec3, radius: f64, place: [f64; 2]) -> Op
         let half = (radius * radius - (square - middle * middle)).max(0.0).sqrt();
         let target = from + dir * (middle - half);
         let pdf = 1.0 / (TAU * height);
-        return Some(Aim { target, is_far: false, dir, pdf, radiance: DVec3::ZERO, is_point: false });
+        let aim = Aim { target, is_far: false, dir, pdf, radiance: DVec3::ZERO, is_point: false };
+        return Some((aim, (target - centre) / radius));
     }
     let normal = in_cone(DVec3::Z, 2.0, place);
     planar(from, centre + normal * radius, normal, 4.0 * PI * radius * radius)
@@ -314,18 +331,18 @@ mod tests {
         let (centre, radius, from) = (DVec3::new(1.0, 2.0, 3.0), 0.5, DVec3::new(-1.0, 0.0, 4.0));
         let random = PixelRandom::new(0, 0, 0);
         for k in 0..1000 {
-            let aim = aim_at_sphere(from, centre, radius, random.spread(k, 0)).unwrap();
+            let (aim, _) = aim_at_sphere(from, centre, radius, random.spread(k, 0)).unwrap();
             assert!(((aim.target - centre).length() - radius).abs() < 1e-6, "{k}");
             let normal = (aim.target - centre) / radius;
             assert!(normal.dot(aim.dir) < 1e-6);
-            let sphere = Emitter::Sphere { centre, radius, material: 0, ids: [0; 2] };
+            let sphere = Emitter::Sphere { centre, radius, magnitude: 5.0, material: 0, ids: [0; 2] };
             assert!((sphere.pdf(from, aim.target, normal) / aim.pdf - 1.0).abs() < 1e-9);
         }
         let sin2 = radius * radius / (centre - from).length_squared();
         let solid_angle = TAU * (1.0 - (1.0 - sin2).sqrt());
-        let aim = aim_at_sphere(from, centre, radius, [0.3, 0.4]).unwrap();
+        let (aim, _) = aim_at_sphere(from, centre, radius, [0.3, 0.4]).unwrap();
         assert!((aim.pdf * solid_angle - 1.0).abs() < 1e-9);
-        let inside = aim_at_sphere(centre + DVec3::X * 0.1, centre, radius, [0.3, 0.4]).unwrap();
+        let (inside, _) = aim_at_sphere(centre + DVec3::X * 0.1, centre, radius, [0.3, 0.4]).unwrap();
         assert!(((inside.target - centre).length() - radius).abs() < 1e-12 && inside.pdf > 0.0);
     }
 

@@ -1,5 +1,7 @@
 //! Which emitting surfaces paths aim at: all that a scene stores, and of its copies as many as memory bears.
 
+use glam::{DAffine3, DVec3};
+
 use super::emitter::Emitter;
 use crate::lanes::Real;
 use crate::scene::assembly::{Part, PartKind};
@@ -63,7 +65,11 @@ impl Surfaces {
                 for prim in start..start + count {
                     let part = world.assembly.part_of(placement.object, prim);
                     let to_world = placement.to_world * part.to_object;
-                    emitters.push(emitter(part, prim, inst as u32, world.material(placement.object, prim), &to_world));
+                    let material = world.material(placement.object, prim);
+                    // Any point of the primitive tells.
+                    let point = || world.surface(DVec3::ZERO, DVec3::ZERO, 0.0, 0.0, 0.0, prim, inst as u32);
+                    let magnitude = || point().magnitude.length();
+                    emitters.push(emitter(part, [prim, inst as u32], magnitude, material, &to_world));
                 }
             }
         }
@@ -101,13 +107,14 @@ fn runs<S: Real>(world: &World<S>, looks: &Looks<'_>, object: u32) -> Vec<Run> {
     list
 }
 
-fn emitter(part: &Part, prim: u32, inst: u32, material: u32, to_world: &glam::DAffine3) -> Emitter {
+fn emitter(part: &Part, ids: [u32; 2], magnitude: impl Fn() -> f64, material: u32, to_world: &DAffine3) -> Emitter {
     match &part.kind {
         PartKind::Mesh(mesh) => {
-            Emitter::triangle(to_world, mesh.corners((prim - part.first_prim) as usize), material, prim, inst)
+            let corners = mesh.corners((ids[0] - part.first_prim) as usize);
+            Emitter::triangle(to_world, corners, magnitude(), material, ids)
         }
-        PartKind::Shape(Shape::Sphere) => Emitter::sphere(to_world, material, [prim, inst]),
-        PartKind::Shape(Shape::Disc) => Emitter::disc(to_world, material, [prim, inst]),
+        PartKind::Shape(Shape::Sphere) => Emitter::sphere(to_world, magnitude(), material, ids),
+        PartKind::Shape(Shape::Disc) => Emitter::disc(to_world, magnitude(), material, ids),
         _ => Emitter::Unaimed,
     }
 }
@@ -117,7 +124,7 @@ mod tests {
     use std::f64::consts::{PI, TAU};
     use std::sync::Arc;
 
-    use glam::{DAffine3, DMat3, DVec3};
+    use glam::DMat3;
 
     use super::*;
     use crate::camera::{Passes, Tiling};

@@ -13,6 +13,7 @@ use crate::lanes::chosen::{at, lanes_of, records, spill};
 use crate::lanes::space::{Frame, choose, scale, sub};
 use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each};
+use crate::shade::offset::end_error;
 
 /// Spheres closer than this, in squares of radii from the centre, are aimed at one by one.
 const CLOSE: f64 = 1.02;
@@ -20,7 +21,7 @@ const CLOSE: f64 = 1.02;
 /// What a packet aims at.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Targets<V: Lanes> {
-    /// The place, or far away the direction to it.
+    /// The place, so far off its surface that rays to there do not meet it, or far away the direction to it.
     pub place: Lanes3<V>,
     /// 1 for a place, 0 for a direction.
     pub near: V,
@@ -158,7 +159,11 @@ fn on_triangles<V: Lanes>(
     let square = dot(away, away);
     let dir = scale(away, one / square.sqrt());
     let cosine = dot(dir, normal);
-    let radiance = choose(cosine.cmp_lt(zero), vector(4), vector(5));
+    let front = cosine.cmp_lt(zero);
+    let radiance = choose(front, vector(4), vector(5));
+    let error = end_error::<V::Scalar, V>(from, place, normal, flat[19]);
+    let off = V::select(front, error, -error);
+    let place = each(|i| normal[i].mul_add(off, place[i]));
     let pdf = others.pdf * square / (cosine.abs() * flat[18]);
     // Seen edge on, or from where it is, it gives nothing.
     let seen = lanes & pdf.cmp_lt(V::splat(V::Scalar::INFINITY)) & zero.cmp_lt(pdf);
@@ -177,7 +182,7 @@ fn on_triangles<V: Lanes>(
 #[inline(always)]
 fn on_balls<V: Lanes>(from: Lanes3<V>, ball: &[V; BALL], u: [V; 2], lanes: V::Mask, others: &Targets<V>) -> Targets<V> {
     let (zero, one, two) = (V::constant(0.0), V::constant(1.0), V::constant(2.0));
-    let [x, y, z, radius, red, green, blue] = *ball;
+    let [x, y, z, radius, red, green, blue, chosen] = *ball;
     let away = sub([x, y, z], from);
     let square = dot(away, away);
     let sine = radius * radius / square;
@@ -193,6 +198,9 @@ fn on_balls<V: Lanes>(from: Lanes3<V>, ball: &[V; BALL], u: [V; 2], lanes: V::Ma
     let half = (radius.mul_add(radius, rounding) - passed).fast_max(zero).sqrt();
     let way = dot(dir, away) - half;
     let place: Lanes3<V> = each(|i| dir[i].mul_add(way, from[i]));
+    let normal = scale(sub(place, [x, y, z]), one / radius);
+    let off = end_error::<V::Scalar, V>(from, place, normal, chosen);
+    let place = each(|i| normal[i].mul_add(off, place[i]));
     let pdf = others.pdf / (V::constant(TAU) * height);
     Targets {
         place: choose(lanes, place, others.place),
@@ -245,8 +253,8 @@ mod tests {
     #[test]
     fn spheres_are_seen_as_one_by_one() {
         let (centre, radius, from) = (DVec3::new(1.0, 2.0, 3.0), 0.5, DVec3::new(-1.0, 0.5, 4.0));
-        let ball = [1.0, 2.0, 3.0, 0.5, 7.0, 8.0, 9.0].map(f64x8::splat);
-        let sphere = Emitter::Sphere { centre, radius, material: 0, ids: [0; 2] };
+        let ball = [1.0, 2.0, 3.0, 0.5, 7.0, 8.0, 9.0, 1e-15].map(f64x8::splat);
+        let sphere = Emitter::Sphere { centre, radius, magnitude: 5.0, material: 0, ids: [0; 2] };
         let (lanes, at) = (LaneMask::from_bits(0xff), from.to_array().map(f64x8::splat));
         let mut mean = DVec3::ZERO;
         many(
