@@ -101,3 +101,17 @@ fn triangles_far_from_the_origin_lose_no_light() {
         parallelogram(d, corner, DVec3::X * (2.0 * half), DVec3::Y * (2.0 * half), id);
     });
 }
+
+/// Every point of the inside sees nothing but the inside: what it emits, and the share `RHO` of that again.
+#[test]
+fn a_sphere_lights_itself_from_within() {
+    for (centre, radius) in [(DVec3::ZERO, 1.3), (DVec3::new(3.0, -2.0, 5.0), 0.7)] {
+        let mut d = dark();
+        let id = add(&mut d, Material { diffuse: DVec3::splat(RHO), ..lamp(1.0) });
+        sphere(&mut d, centre, radius, id);
+        let eye = centre + DVec3::new(0.1, 0.2, 0.0) * radius;
+        let camera = look(eye, eye + DVec3::new(0.9, 0.3, 0.2), 0.8);
+        shows::<f32>("f32", &d, &camera, 1.0 + RHO, 1e-3);
+        shows::<f64>("f64", &d, &camera, 1.0 + RHO, 1e-3);
+    }
+}

@@ -12,6 +12,11 @@ use crate::shade::lights::Spot;
 use crate::shade::look::Looks;
 use crate::shade::offset::{chosen_error, end_error};
 
+/// Spheres closer than this, in squares of radii from the centre, are aimed at by their area, as from within. Whoever asks
+/// for the density does so from where a ray starts, a little beside the point that aimed, and a point of the sphere may be
+/// rounded to either side: all must agree about which it was.
+pub(super) const CLOSE: f64 = 1.02;
+
 /// Something that shines.
 #[derive(Clone, Copy, Debug)]
 pub enum Emitter {
@@ -255,11 +260,12 @@ fn on_triangle([u, v]: [f64; 2]) -> [f64; 2] {
     if v > u { [0.5 * u, v - 0.5 * u] } else { [u - 0.5 * v, 0.5 * v] }
 }
 
-/// `1 - cos` of half the angle under which a sphere is seen from a distance whose square is `square`; `None` inside.
+/// `1 - cos` of half the angle under which a sphere is seen from a distance whose square is `square`; `None` inside and
+/// closer than [`CLOSE`].
 fn cap(square: f64, radius: f64) -> Option<f64> {
     let sin2 = radius * radius / square;
     // (1 - cos) without cancellation for small angles.
-    (sin2 < 1.0 - 1e-9).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
+    (CLOSE * (radius * radius) < square).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
 }
 
 /// Aim at a sphere, without radiance, and its normal there on the side of `from`.

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::Paths;
 use super::bsdf::warp::disc;
+use super::emitter::CLOSE;
 use super::form::{BALL, FLAT, Kind};
 use super::scatter::Column;
 use crate::lanes::chosen::{at, lanes_of, records, spill};
@@ -14,9 +15,6 @@ use crate::lanes::space::{Frame, choose, scale, sub};
 use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes, Lanes3, MAX_LANES, Real, dot, each};
 use crate::shade::offset::end_error;
-
-/// Spheres closer than this, in squares of radii from the centre, are aimed at one by one.
-const CLOSE: f64 = 1.02;
 
 /// What a packet aims at.
 #[derive(Clone, Copy, Debug)]
@@ -131,7 +129,7 @@ impl<V: Lanes> Targets<V> {
     }
 }
 
-/// Whether points are outside of spheres, and not too close to them.
+/// Whether points are outside of spheres, and not too close to them: others are aimed at one by one.
 #[inline(always)]
 fn is_outside<V: Lanes>(from: Lanes3<V>, ball: &[V; BALL]) -> V::Mask {
     let away = sub([ball[0], ball[1], ball[2]], from);
