@@ -115,3 +115,18 @@ fn a_sphere_lights_itself_from_within() {
         shows::<f64>("f64", &d, &camera, 1.0 + RHO, 1e-3);
     }
 }
+
+/// A lamp with holes shows its near side and, through that, the inside of its far side, as large.
+#[test]
+fn spheres_with_holes_shine_with_both_sides() {
+    let (centre, radius, z) = (DVec3::new(1.0, 0.0, 2.0), 1.5, 2.0 / f64::sqrt(5.0));
+    for opacity in [0.3, 0.5, 0.8] {
+        let (d, camera) = receiver(DVec3::ZERO, |d| {
+            let id = add(d, Material { alpha: Alpha::Blend, opacity, ..lamp(L) });
+            sphere(d, centre, radius, id);
+        });
+        let seen = 1.0 - (1.0 - opacity) * (1.0 - opacity);
+        let want = RHO * L * seen * radius * radius / centre.length_squared() * z;
+        shows::<f32>(&format!("opacity {opacity}"), &d, &camera, want, 1e-2);
+    }
+}

@@ -203,6 +203,8 @@ impl Emitter {
                 if cosine > 0.0 && area > 0.0 { square / (cosine * area) } else { 0.0 }
             }
             Self::Sphere { centre, radius, .. } => match cap((centre - from).length_squared(), radius) {
+                // Only the near side is aimed at; through its holes the far one is seen, too.
+                Some(_) if (to - from).dot(to - centre) > 0.0 => 0.0,
                 Some(height) => 1.0 / (TAU * height),
                 None => {
                     let away = to - from;
