@@ -34,7 +34,10 @@ impl Classic {
         let from_front = surface.ng.dot(dir) <= 0.0;
         let material = looks.resolve(surface.material, 1.0);
         let look = looks.look(material, surface, from_front);
-        let cos = surface.ng.dot(dir.normalize_or_zero()).abs().min(1.0);
+        let unit = dir.normalize_or_zero();
+        // Mirrors and glass turn rays at the shading normal, except where it is seen from behind.
+        let (own, shading) = (surface.ng.dot(unit), looks.bumped(surface.material, surface).dot(unit));
+        let cos = if own * shading > 0.0 { shading } else { own }.abs().min(1.0);
         let emission = looks.emission(surface.material, surface, from_front);
         Self { emission, base: look.base, ..Self::scattered(&look, cos) }
     }

@@ -258,8 +258,11 @@ impl<S: Real> Shader<'_, S> {
         // Only a matte surface scatters alike whatever the angle.
         if of_model[Model::Matte as usize] != lanes {
             let dir: Lanes3<S::Wide> = each(|axis| S::Wide::load(&rays.dir[axis][first..]));
-            let along = dot(vertices.vector::<S::Wide>(NORMAL, first), dir).abs() / dot(dir, dir).sqrt();
-            cos = along.fast_min(cos);
+            let own = dot(vertices.vector::<S::Wide>(NORMAL, first), dir).abs();
+            let shading = -dot(vertices.shading(first), dir);
+            // As in [`Classic::of`].
+            let along = S::Wide::select(S::Wide::constant(0.0).cmp_lt(shading), shading, own);
+            cos = (along / dot(dir, dir).sqrt()).fast_min(cos);
         }
         for (model, lanes) in Model::ALL.into_iter().zip(of_model).filter(|(_, lanes)| *lanes != 0) {
             self.put_terms(model, base, &param, cos, (first, lanes), vertices);

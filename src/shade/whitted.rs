@@ -187,7 +187,8 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
         if lanes == 0 {
             continue;
         }
-        let (dir, goes_on) = refracted(along(first), vertices.vector(NORMAL, first), vertices.scalar(ETA, first));
+        let (dir, normal, shading) = (along(first), vertices.vector(NORMAL, first), vertices.shading(first));
+        let (dir, goes_on) = entering(dir, normal, shading, vertices.scalar(ETA, first));
         let lanes = lanes & goes_on.bits();
         next.push(lanes, &carried.path[first..], [vertices.enter(first), dir, throughput], S::INFINITY);
     }
@@ -195,6 +196,18 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
     let mirrored = next.rays.live_among(count_mirrored);
     work.rays.mirror += mirrored as u64;
     work.rays.refracted += (next.rays.live_count() - mirrored) as u64;
+}
+
+/// Directions `dir` refracted at surfaces with unit normals `normal` and shading normals `shading`, and the lanes without
+/// total reflection; see [`refracted`].
+#[inline(always)]
+fn entering<V: Lanes>(dir: Lanes3<V>, normal: Lanes3<V>, shading: Lanes3<V>, eta: V) -> (Lanes3<V>, V::Mask) {
+    let zero = V::constant(0.0);
+    let (bent, bends) = refracted(dir, shading, eta);
+    let (own, goes_on) = refracted(dir, normal, eta);
+    // Where the shading normal is seen from behind, or would send the ray out again, the surface's own normal decides.
+    let inward = dot(dir, shading).cmp_lt(zero) & dot(bent, normal).cmp_lt(zero);
+    (choose(inward, bent, own), inward & bends | !inward & goes_on)
 }
 
 /// Directions `dir` mirrored at planes with unit normals `normal`; the length stays.

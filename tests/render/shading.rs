@@ -1,6 +1,7 @@
 //! Rendered pixels against values worked out by hand: lighting, shadows, mirrors, occlusion, AOVs.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3};
 use lanecast::camera::Camera;
@@ -9,6 +10,8 @@ use lanecast::render::{Aov, RenderOptions, RenderOutput, Silent, render};
 use lanecast::scene::description::{
     CameraDescription, Description, Item, ItemKind, Light, Material, Projection, Shape,
 };
+use lanecast::scene::material::Scattering;
+use lanecast::scene::mesh::{Attribute, Mesh};
 use lanecast::scene::world::{Preset, World};
 use lanecast::shade::{Integrator, Shades};
 
@@ -176,6 +179,50 @@ fn two_mirrors_multiply_and_depth_counts_them() {
     let geometric = |m: f64| 1.0 + m + m * m + m * m * m;
     close(color(&output.film, 0, 0), DVec3::new(geometric(0.9), geometric(0.8), geometric(0.7)));
     assert_eq!(output.rays.mirror, 3);
+}
+
+/// The share that glass of index 1.5 mirrors of light under `angle` to its normal.
+fn fresnel(angle: f64) -> f64 {
+    let inside = (angle.sin() / 1.5).asin();
+    let (a, b) = (angle.cos() - 1.5 * inside.cos(), 1.5 * angle.cos() - inside.cos());
+    let (over_a, over_b) = (angle.cos() + 1.5 * inside.cos(), 1.5 * angle.cos() + inside.cos());
+    0.5 * ((a / over_a).powi(2) + (b / over_b).powi(2))
+}
+
+/// A square of glass whose shading normals lean to +x by 50 degrees, seen by rays that run to +x under `degrees` from
+/// straight down; a lamp is where they are bent to: `bent` degrees from straight down, towards +x.
+fn smooth_glass<S: Shades>(degrees: f64, bent: f64) -> DVec3 {
+    let along = |degrees: f64| DVec3::new(degrees.to_radians().sin(), 0.0, -degrees.to_radians().cos());
+    let mut d = scene(None, &[(along(bent) * 5.0, 0.1, 2)]);
+    let glass = Scattering::Dielectric { ior: 1.5, roughness: 0.0, tint: DVec3::ONE };
+    d.materials.push(Material { scattering: glass, diffuse: DVec3::ONE, ..Material::default() });
+    let normal = -along(-50.0);
+    let mesh = Mesh {
+        positions: [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        normals: Attribute { values: vec![normal.as_vec3().to_array(); 4], indices: Vec::new() },
+        ..Mesh::default()
+    };
+    d.meshes.push(Arc::new(mesh));
+    let (kind, transform) = (ItemKind::Mesh(0), DAffine3::IDENTITY);
+    d.groups[0].items.push(Item { transform, material: Some(3), kind });
+    color(&picture::<S>(&d, &look(along(degrees) * -4.0, DVec3::ZERO, 0.01), &options(1)).film, 0, 0)
+}
+
+#[test]
+fn glass_bends_light_at_the_shading_normal() {
+    let lamp = DVec3::new(3.0, 2.0, 1.0);
+    let near = |got: DVec3, want: DVec3| assert!((got - want).abs().max_element() < 1e-4, "got {got}, want {want}");
+    // Straight down is 50 degrees from the normal; within, by Snell's law, 30.7.
+    let inside = (50f64.to_radians().sin() / 1.5).asin().to_degrees();
+    let want = lamp * (1.0 - fresnel(50f64.to_radians()));
+    near(smooth_glass::<f32>(0.0, inside - 50.0), want);
+    near(smooth_glass::<f64>(0.0, inside - 50.0), want);
+    // From the left the shading normal is seen from behind: the square's own decides.
+    let own = (60f64.to_radians().sin() / 1.5).asin().to_degrees();
+    let want = lamp * (1.0 - fresnel(60f64.to_radians()));
+    near(smooth_glass::<f32>(60.0, own), want);
+    near(smooth_glass::<f64>(60.0, own), want);
 }
 
 #[test]
