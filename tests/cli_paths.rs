@@ -93,6 +93,27 @@ fn a_time_limit_ends_the_picture_in_time() {
     assert!(samples(&picture(&dir, "few.exr")).iter().all(|&n| n == 6));
 }
 
+/// The integer attribute `name` of an EXR file: its name and type, each with a zero, its size, and itself.
+fn attribute(dir: &tempfile::TempDir, file: &str, name: &str) -> i32 {
+    let bytes = std::fs::read(dir.path().join(file)).expect("a file");
+    let head = [name.as_bytes(), b"\0int\0\x04\0\0\0"].concat();
+    let at = bytes.windows(head.len()).position(|window| window == head).expect("the attribute") + head.len();
+    i32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
+}
+
+#[test]
+fn pictures_say_how_many_samples_were_taken() {
+    let dir = folder();
+    for (limit, most) in
+        [("--noise 0.2", 1000), ("--time-limit 1e-9", 4), ("--time-limit 600 --spp 6", 6), ("--spp 3", 3)]
+    {
+        let report = run(&dir, &format!("{PATHS} -o a.exr {limit}")).json();
+        let taken = report["samples_per_pixel"].as_f64().expect("a number");
+        let said = attribute(&dir, "a.exr", "lanecast/spp");
+        assert!(said >= 1 && said <= most && (taken - f64::from(said)).abs() <= 0.5, "{limit}: {said}, not {taken}");
+    }
+}
+
 #[test]
 fn limits_that_mean_nothing_are_refused() {
     let dir = folder();

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use indicatif::ProgressBar;
 
 use self::kept::{keeper, say};
-use self::report::{Holds, Made, report, tell};
+use self::report::{Holds, Made, report, samples_per_pixel, tell};
 use super::common::{CameraArgs, EngineArgs, OutputArgs, SceneArgs, ThreadArgs, finite, stop_flag, with_pool};
 use super::picture::{Format, Target, files, target, write_each};
 use super::preview::{Job, PreviewArgs};
@@ -337,7 +337,12 @@ fn picture<S: Shades>(
         engine: engine.name().into(),
         isa: compiled_isa().into(),
         lanes: engine.lanes() as u32,
-        spp: options.spp,
+        // With a limit of noise or time the number asked for is only the most there may be.
+        spp: if args.noise.is_none() && args.time_limit.is_none() && output.is_complete() {
+            options.spp
+        } else {
+            samples_per_pixel(&output).round().max(1.0) as u32
+        },
         seed: options.seed,
         render_seconds: output.seconds,
         rays: output.rays.total(),

@@ -82,6 +82,11 @@ impl Holds {
     }
 }
 
+/// Samples that were taken of a pixel, on average.
+pub(super) fn samples_per_pixel(output: &RenderOutput) -> f64 {
+    output.rays.primary as f64 / output.film.window.area().max(1) as f64
+}
+
 /// What `--json` says about a render.
 pub(super) fn report<'a>(
     args: &'a RenderArgs,
@@ -90,6 +95,7 @@ pub(super) fn report<'a>(
     made: &Made,
 ) -> Report<'a> {
     let (film, rays) = (&output.film, output.rays);
+    let samples_per_pixel = samples_per_pixel(output);
     Report {
         scene: &args.scene.scene,
         file: args.file(),
@@ -102,7 +108,7 @@ pub(super) fn report<'a>(
         isa: compiled_isa(),
         threads: rayon::current_num_threads(),
         spp: options.spp,
-        samples_per_pixel: rays.primary as f64 / film.window.area().max(1) as f64,
+        samples_per_pixel,
         seed: options.seed,
         complete: output.is_complete(),
         tiles: (output.tiles_done, output.tiles_total),

@@ -27,7 +27,7 @@ pub struct ImageInfo {
     pub isa: String,
     /// Lane width; `lanecast/lanes`, an int.
     pub lanes: u32,
-    /// Samples per pixel; `lanecast/spp`, an int.
+    /// Samples per pixel, on average where pixels have different numbers of them; `lanecast/spp`, an int.
     pub spp: u32,
     /// Seed of the sampler; `lanecast/seed`, a string of decimal digits because EXR has no 64-bit integer.
     pub seed: u64,
