@@ -22,7 +22,7 @@ pub const MAX_DIFFERING: f64 = 1e-4;
 /// Largest share of rays that may differ in a row that gets a figure although more than [`MAX_DIFFERING`] do, because the oracle
 /// explains our answer to each of them and the peer's to all but [`MAX_DIFFERING`]: in instances starts are rounded on the way in, and
 /// near hits at a flat angle move far.
-pub const MAX_EXPLAINED: f64 = 1e-3;
+pub const MAX_EXPLAINED: f64 = 4e-3;
 
 /// How a peer's answers compare with ours.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -173,10 +173,10 @@ mod tests {
     }
 
     #[test]
-    fn one_in_a_thousand_may_differ_if_the_oracle_explains_it() {
+    fn four_in_a_thousand_may_differ_if_the_oracle_explains_it() {
         let at = |differing| Agreement { rays: 20_000, differing: (0..differing).collect(), ..Default::default() };
-        assert!(at(3).passes_if(|| Some(0)) && at(20).passes_if(|| Some(0)));
-        assert!(!at(3).passes_if(|| None) && !at(21).passes_if(|| Some(0)));
+        assert!(at(3).passes_if(|| Some(0)) && at(80).passes_if(|| Some(0)));
+        assert!(!at(3).passes_if(|| None) && !at(81).passes_if(|| Some(0)));
         // No more that it does not explain than may differ anyway.
         assert!(at(20).passes_if(|| Some(2)) && !at(20).passes_if(|| Some(3)));
         assert!(at(2).passes_if(|| unreachable!("nobody asks the oracle for what passes anyway")));

@@ -13,7 +13,7 @@ use lanecast::scene::description::{Description, ItemKind};
 use lanecast::scene::mesh::Mesh;
 use lanecast::scene::world::{BuildSettings, Preset, World};
 use lanecast::trace::Scratch;
-use tile_support::{camera, find, mirrored, shadows};
+use tile_support::{camera, compile, differences, find, mirrored, shadows};
 
 /// One world with three trees.
 fn worlds(meshes: &[Mesh]) -> [World<f32>; 3] {
@@ -107,4 +107,31 @@ fn tiles_leave_triangles_that_their_rays_do_not_share() {
     println!("pairs, hits: {far:?} far away, {near:?} nearby");
     assert!(far.1 > 400 && near.1 > 4000, "{far:?} {near:?}");
     assert!(far.0 == 0 && near.0 > 0, "{far:?} {near:?}");
+}
+
+/// Rays of one origin, or to one light, in no order: groups lie all over each other, and no pair of a triangle and a group is tested.
+#[test]
+fn tiles_leave_rays_in_no_order() {
+    let scene = compile(vec![ball(60, 80), soup(300, &mut Random(3))]);
+    let mut r = Random(11);
+    let primary = camera(DVec3::new(0.3, 0.4, 2.5), DVec3::ZERO, 0.6, 64);
+    let shadow = shadows(&scene, &primary, DVec3::new(3.0, 4.0, 1.0), 1.0, 1e-4);
+    for (ordered, any) in [(&primary, false), (&shadow, true)] {
+        let mut places: Vec<usize> = (0..ordered.len()).collect();
+        (1..places.len()).rev().for_each(|i| places.swap(i, r.below(i + 1)));
+        let mut shuffled = Rays::new(places.len());
+        for (i, &k) in places.iter().enumerate() {
+            shuffled.set(i, ordered.org(k), ordered.dir(k), ordered.t_min[k], ordered.t_max[k]);
+        }
+        let counted = |rays: &Rays<f32>| {
+            let (mut scratch, mut counters) = (Scratch::default(), Counters::default());
+            match any {
+                false => find("tile").intersect(&scene, rays, &mut Hits::default(), &mut scratch, Some(&mut counters)),
+                true => find("tile").occluded(&scene, rays, &mut Vec::new(), &mut scratch, Some(&mut counters)),
+            }
+            counters.prim_lanes_linear
+        };
+        assert!(counted(ordered) > 0 && counted(&shuffled) == 0, "any {any}");
+        assert_eq!(differences(&scene, &shuffled), (0, 0), "any {any}");
+    }
 }

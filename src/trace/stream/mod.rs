@@ -54,6 +54,9 @@ pub const SOURCE: usize = 4096;
 /// Widest range of the slopes of rays that are traced as a packet.
 const SPREAD: f64 = 0.25;
 
+/// The same where chunks have the plain test, which makes them the faster for all but parallel rays.
+const PLAIN_SPREAD: f64 = 1.0 / 64.0;
+
 /// How many vectors ahead the memory is asked for rays.
 const AHEAD: usize = 4;
 
@@ -124,8 +127,8 @@ pub struct Job<'a, S> {
     pub output: Output<'a, S>,
     /// Rays that point the same way are known to have few triangles in common all the same: none are traced as packets.
     pub apart: bool,
-    /// Closest-hit: hits may be those of the plain test, not the common formula's, where it is certain (see [`sift`]). None are traced
-    /// as packets then: chunks are the faster.
+    /// Closest-hit: hits may be those of the plain test, not the common formula's, where it is certain (see [`sift`]). Few are
+    /// traced as packets then: chunks are the faster.
     pub plain: bool,
 }
 
@@ -218,12 +221,7 @@ impl<S: Real> Job<'_, S> {
     #[inline(always)]
     fn alike<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
         let (packet, t_max, live) = self.load::<V, COUNT>(at);
-        if live != 0
-            && !self.apart
-            && (ANY || !self.plain)
-            && Signs::of(&packet).agree(live)
-            && self.packet::<V, ANY, COUNT>(at, live)
-        {
+        if live != 0 && !self.apart && Signs::of(&packet).agree(live) && self.packet::<V, ANY, COUNT>(at, live) {
             return 0;
         }
         self.sort(at, &packet, t_max, live)
@@ -285,7 +283,7 @@ impl<S: Real> Job<'_, S> {
             let (low, high) = slope.range(live);
             high - low
         };
-        let most = V::Scalar::from_f64(SPREAD);
+        let most = V::Scalar::from_f64(if ANY || !self.plain { SPREAD } else { PLAIN_SPREAD });
         let alike = spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most;
         if alike {
             self.trace::<V, ANY, COUNT>(at, &packet, t_max, live);

@@ -32,7 +32,9 @@ mod held;
 mod lines;
 mod listing;
 mod mirror;
+mod mixed;
 mod node;
+mod others;
 mod own;
 mod pairs;
 mod place;
@@ -45,12 +47,12 @@ mod walk;
 mod written;
 
 use super::output::Output;
-use super::query::{Query, Stack};
-use super::{Generic, Scratch, stream, traverse};
+use super::query::Stack;
+use super::{Scratch, stream};
 use crate::lanes::{Lanes, f32x16};
-use crate::ray::{Counters, HitPacket, Packet, Rays};
+use crate::ray::{Counters, Rays};
 use crate::scene::world::World;
-use bundle::{Bundle, Shared};
+use bundle::{Bundle, Shared, Source};
 use columns::{AHEAD, Next};
 use exact::Exact;
 use presumed::First;
@@ -239,21 +241,6 @@ impl<'a> Job<'a> {
         self.end();
     }
 
-    /// Traces the groups that start at `starts` by the stream kernel; returns the list, empty. `apart`: see [`stream::Job`].
-    fn streamed<const ANY: bool, const EXACT: bool, const COUNT: bool>(
-        &mut self,
-        mut starts: Vec<usize>,
-        apart: bool,
-    ) -> Vec<usize> {
-        if !starts.is_empty() {
-            let Self { world, rays, stream: memory, stack, counters, output, .. } = self;
-            let plain = !EXACT;
-            let mut job = stream::Job { world, rays, memory, stack, counters, output: output.reborrow(), apart, plain };
-            job.run::<V, ANY, COUNT>(starts.drain(..));
-        }
-        starts
-    }
-
     /// Traces a block after one look at its rays; false if they are not what was presumed, or spread too wide.
     fn presumed<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &mut Bundle) -> bool {
         let groups = bundle.groups();
@@ -261,11 +248,6 @@ impl<'a> Job<'a> {
             true => self.tile::<1, ANY, EXACT, COUNT>(bundle, groups),
             false => self.tile::<SETS, ANY, EXACT, COUNT>(bundle, groups),
         }
-    }
-
-    /// Leaves `N` sets to the stream kernel.
-    fn leave<const N: usize>(&mut self, first: usize) {
-        self.memory.rest.extend((0..bundle::groups::<N>(self.rays, first)).map(|g| first + g * V::N));
     }
 
     /// Traces a block as one tile or as one for each set.
@@ -282,9 +264,13 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Traces some groups of one set as one tile, or as four or sixteen where its rays spread too wide, or as packets.
+    /// Traces some groups of one set as one tile, unless its rays spread too wide; as four or sixteen or as packets where tiles are to
+    /// be smaller than a set.
     fn set<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &mut Bundle, all: u64) {
-        if self.most >= SET && self.tile::<1, ANY, EXACT, COUNT>(bundle, all) {
+        if self.most >= SET {
+            if !self.tile::<1, ANY, EXACT, COUNT>(bundle, all) {
+                self.leave_some(bundle, all);
+            }
             return;
         }
         for quarter in [0xf, 0xf0, 0xf00, 0xf000] {
@@ -311,6 +297,10 @@ impl<'a> Job<'a> {
         }
         if !self.memory.groups.load::<N, ANY, EXACT>(bundle, groups, self.world) {
             return false;
+        }
+        if !self.memory.groups.is_behind && self.memory.groups.are_mixed::<N>() {
+            self.leave_some(bundle, groups);
+            return !matches!(bundle.source, Source::Pencil(..));
         }
         if self.is_dense::<N>() {
             self.memory.apart.extend(listing::groups(groups).map(|g| bundle.first + g * V::N));
@@ -369,28 +359,5 @@ impl<'a> Job<'a> {
             Output::Closest(hits, names) if is_part => mirror::put(&hit, (hits, *names), first, lanes),
             output => output.put(first, &hit, 0),
         }
-    }
-
-    /// The packet kernel for some lanes, on top of hits that other lanes have.
-    #[cold]
-    #[inline(never)]
-    fn rest<const ANY: bool, const COUNT: bool>(
-        &mut self,
-        first: usize,
-        lanes: u32,
-        so_far: Option<HitPacket<V>>,
-    ) -> (HitPacket<V>, u32) {
-        let (packet, t_max, _) = Packet::<V>::load(self.rays, first);
-        let hit = so_far.unwrap_or(HitPacket::new(t_max));
-        let mut query = Query::<V, ANY, COUNT>::new(hit, self.stack, self.counters);
-        traverse::world(self.world, &packet, &mut query, lanes);
-        (query.hit, query.done)
-    }
-
-    /// A group as a packet.
-    fn packet<const ANY: bool, const COUNT: bool>(&mut self, first: usize) {
-        let (hit, done) =
-            Generic::<V, true>::packet::<ANY, COUNT>(self.world, self.rays, first, self.stack, self.counters);
-        self.output.put(first, &hit, done);
     }
 }
