@@ -45,7 +45,7 @@ use best::Best;
 use block::Block;
 use chunk::{Chunk, RAYS};
 use inside::Inside;
-use signs::Signs;
+use signs::{Signs, is_narrow};
 pub use visitors::{MOST, Visitors};
 
 /// Rays that are sorted together.
@@ -279,12 +279,8 @@ impl<S: Real> Job<'_, S> {
     #[inline(never)]
     fn packet<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize, live: u32) -> bool {
         let (packet, t_max, _) = Packet::<V>::load(self.rays, at);
-        let spread = |slope: V| {
-            let (low, high) = slope.range(live);
-            high - low
-        };
-        let most = V::Scalar::from_f64(if ANY || !self.plain { SPREAD } else { PLAIN_SPREAD });
-        let alike = spread(packet.shear[0]) <= most && spread(packet.shear[1]) <= most;
+        let most = if ANY || !self.plain { SPREAD } else { PLAIN_SPREAD };
+        let alike = packet.shear[..2].iter().all(|slope| is_narrow(*slope, most, live));
         if alike {
             self.trace::<V, ANY, COUNT>(at, &packet, t_max, live);
         }

@@ -1,4 +1,4 @@
-//! What rays are sorted by.
+//! What rays are sorted by, and whether they point nearly the same way.
 
 use crate::lanes::{LaneMask, Lanes, Real, each, map3};
 use crate::ray::Packet;
@@ -26,5 +26,17 @@ impl Signs {
     pub fn nearly_agree(&self, live: u32) -> bool {
         let [x, y, z] = each(|axis| u32::from(self.0[axis] & live == 0 || self.0[axis] & live == live));
         x + y + z >= 2
+    }
+}
+
+/// Whether the range of the `live` numbers is no wider than `most`. Mostly all are within half of it from one of them, and no minimum
+/// over a vector is asked for.
+#[inline(always)]
+pub fn is_narrow<V: Lanes>(numbers: V, most: f64, live: u32) -> bool {
+    let one = V::splat(numbers.lane(live.trailing_zeros() as usize & (V::N - 1)));
+    let close = (numbers - one).abs().cmp_le(V::constant(0.5 * most)).bits() & live;
+    close == live || {
+        let (low, high) = numbers.range(live);
+        high - low <= V::Scalar::from_f64(most)
     }
 }
