@@ -48,7 +48,8 @@ impl<V: Lanes> Edges<V> {
         Self { depth: [a_depth, b_depth, c_depth], functions: [cross(c, b), cross(a, c), cross(b, a)] }
     }
 
-    /// The same where products that round to one number differ by what was rounded: signs are exact.
+    /// The same where products that round to one number differ by what was rounded: signs are exact. Not so near the smallest numbers,
+    /// where what was rounded is lost, and the corners with it; the restart decides there.
     #[cold]
     #[inline(never)]
     pub fn told([org, shear]: &[Lanes3<V>; 2], axis: usize, corners: &[V; Triangle::FIELDS]) -> Self {
@@ -61,7 +62,8 @@ impl<V: Lanes> Edges<V> {
                 let (one, other) = (p[0] * q[1], p[1] * q[0]);
                 let rounded = p[0].mul_add(q[1], -one) - p[1].mul_add(q[0], -other);
                 let difference = one - other;
-                V::select(difference.cmp_eq(V::constant(0.0)), rounded, difference)
+                let told = V::constant(Triangle::least_det::<V::Scalar>()).cmp_le(one.abs());
+                V::select(difference.cmp_eq(V::constant(0.0)) & told, rounded, difference)
             },
         )
     }

@@ -251,7 +251,7 @@ impl Triangle {
 
     /// Determinants below this may have lost bits to underflow.
     #[inline(always)]
-    fn least_det<S: Real>() -> f64 {
+    pub(super) fn least_det<S: Real>() -> f64 {
         S::MIN_POSITIVE.to_f64() / (S::EPSILON.to_f64() * S::EPSILON.to_f64())
     }
 

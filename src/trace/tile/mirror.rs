@@ -294,7 +294,8 @@ impl Job<'_> {
             stack,
             counters,
             output: Output::Closest(&mut hits, self.world.names.as_ref()),
-            apart: false,
+            // Which rays wait here together is chance, and must not matter.
+            apart: !EXACT,
             plain: !EXACT,
         };
         job.run::<V, false, COUNT>((0..ids.len()).step_by(V::N));
