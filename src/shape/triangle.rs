@@ -160,10 +160,9 @@ impl Triangle {
             wanted &= wanted - 1;
             let mut maybe = V::Mask::from_bits(maybe[i]);
             let n = block.get(i);
-            let mut edges = edges(i);
+            let edges = edges(i);
             if (edges.vague() & maybe).any() {
-                edges = Edges::told(&[org, packet.shear], K, &n.map(V::splat));
-                maybe = maybe & !edges.outside();
+                maybe = maybe & !Edges::told(&[org, packet.shear], K, &n.map(V::splat)).outside();
             }
             let candidate = Self::accept(packet, &Facts::of(&n), maybe, edges.functions, true, |_| n);
             found(&candidate, lanes, block.prim[i]);
@@ -177,12 +176,11 @@ impl Triangle {
         let rcp = S::Octo::splat(ray.rcp);
         let corners = |f: usize| S::Octo::load(&block.fields[f]);
         let (org, shear) = (map3(ray.org, S::Octo::splat), map3(ray.shear, S::Octo::splat));
-        let mut edges = Edges::new(org, shear, ray.axis, corners);
+        let edges = Edges::new(org, shear, ray.axis, corners);
         let aside = edges.aside(rcp, S::Octo::splat(t_min), S::Octo::splat(t_max));
         let mut maybe = (!(edges.outside() | aside)).bits();
         if maybe != 0 && edges.vague().bits() & maybe != 0 {
-            edges = Edges::told(&[org, shear], ray.axis, &std::array::from_fn(corners));
-            maybe &= !edges.outside().bits();
+            maybe &= !Edges::told(&[org, shear], ray.axis, &std::array::from_fn(corners)).outside().bits();
         }
         (maybe, edges.functions)
     }

@@ -36,10 +36,7 @@ impl Frame {
     pub fn of<const N: usize>(bundle: &Bundle, groups: u64, bounds: &Aabb<f32>) -> Option<Self> {
         let apex = bundle.apex;
         let extent = reach(bounds, apex);
-        let exponent = ((extent.to_bits() >> 23) as i32) - 127;
-        if !EXPONENTS.contains(&exponent) {
-            return None;
-        }
+        let exponent = exponent(extent).filter(|exponent| EXPONENTS.contains(exponent))?;
         let scale = f32::from_bits(((127 - exponent) as u32) << 23);
         let rays = match bundle.source {
             Source::Batch(rays) => rays,
@@ -133,6 +130,16 @@ impl Frame {
     pub fn coordinates<L: Lanes<Scalar = f32>>(&self, d: Lanes3<L>) -> Lanes3<L> {
         map3(self.axes, |axis| dot(d, map3(axis, L::splat)))
     }
+}
+
+/// The exponent of a finite length.
+fn exponent(extent: f32) -> Option<i32> {
+    extent.is_finite().then(|| ((extent.to_bits() >> 23) as i32) - 127)
+}
+
+/// Whether the tile's arithmetic is made for geometry within `bounds` as seen from `apex`, whatever rays there are.
+pub fn suits(bounds: &Aabb<f32>, apex: [f32; 3]) -> bool {
+    exponent(reach(bounds, apex)).is_some_and(|exponent| EXPONENTS.contains(&exponent))
 }
 
 /// Largest coordinate of a box as seen from the apex.

@@ -269,7 +269,11 @@ impl<'a> Job<'a> {
     fn set<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self, bundle: &mut Bundle, all: u64) {
         if self.most >= SET {
             if !self.tile::<1, ANY, EXACT, COUNT>(bundle, all) {
-                self.leave_some(bundle, all);
+                match frame::suits(self.world.tree_bounds(), bundle.apex) {
+                    true => self.leave_some(bundle, all),
+                    // Next to the smallest and the largest numbers packets keep the common formula's bits whatever is rounded to zero.
+                    false => listing::groups(all).for_each(|g| self.packet::<ANY, COUNT>(bundle.first + g * V::N)),
+                }
             }
             return;
         }
