@@ -289,7 +289,7 @@ impl Groups {
         }
         self.slack = (bundle.slack + 8.0 * HALF_ULP * greatest(reach)) * self.frame.scale;
         self.is_behind = bundle.shared == Shared::Behind;
-        self.room = if EXACT { None } else { Room::of::<N>(self, bundle) };
+        self.room = if EXACT { None } else { Room::of::<N>(self, bundle, groups) };
         (self.front, self.loose) = (0.0, 32.0 * HALF_ULP * (1.0 + self.wide));
         if self.is_behind {
             let front = least(front);

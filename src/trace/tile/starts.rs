@@ -30,12 +30,15 @@ impl Starts {
         Self { lo: each(|a| least(lo[a])), hi: each(|a| greatest(hi[a])) }
     }
 
-    /// Those of some lanes of some groups; `None` if there are none.
+    /// Those of some lanes of the groups that are `loaded`, as bits: others still hold what another tile left; `None` if there are none.
     #[inline(never)]
-    fn of_lanes(groups: &[Group], lanes: &[u32]) -> Option<Self> {
+    fn of_lanes(groups: &[Group], lanes: &[u32], loaded: u64) -> Option<Self> {
         let (least_of_none, greatest_of_none) = (V::splat(f32::INFINITY), V::splat(f32::NEG_INFINITY));
         let (mut lo, mut hi) = ([least_of_none; 3], [greatest_of_none; 3]);
-        for (Group { start, .. }, lanes) in groups.iter().zip(lanes).filter(|(_, lanes)| **lanes != 0) {
+        for (g, (Group { start, .. }, lanes)) in groups.iter().zip(lanes).enumerate() {
+            if *lanes == 0 || loaded >> g & 1 == 0 {
+                continue;
+            }
             let lanes = Mask::from_bits(*lanes);
             lo = each(|a| select(lanes, start[a], least_of_none).fast_min(lo[a]));
             hi = each(|a| select(lanes, start[a], greatest_of_none).fast_max(hi[a]));
@@ -68,13 +71,13 @@ pub struct Room {
 }
 
 impl Room {
-    /// That of loaded groups of a bundle, whose starts are loaded, too; `None` if they are not known, or start in the common point.
+    /// That of the `loaded` groups of a bundle, as bits, whose starts are loaded, too; `None` if they are not known, or start in the common point.
     #[inline(always)]
-    pub fn of<const N: usize>(groups: &Groups, bundle: &Bundle) -> Option<Self> {
+    pub fn of<const N: usize>(groups: &Groups, bundle: &Bundle, loaded: u64) -> Option<Self> {
         let starts = match (bundle.shared, &groups.starts) {
             (Shared::Start, _) => return None,
             (_, Some(starts)) => *starts,
-            _ => Starts::of_lanes(&groups.of[..N * SET], &bundle.tame)?,
+            _ => Starts::of_lanes(&groups.of[..N * SET], &bundle.tame, loaded)?,
         };
         // A power of two.
         let scale = 1.0 / groups.frame.scale;
@@ -170,7 +173,12 @@ mod tests {
             let mut bundle = Bundle { apex, slack: 1e-6, shared, tame, ..Bundle::unsorted(&rays, 0, GROUPS) };
             bundle.tame[round % GROUPS] = 0;
             let mut starts = Vec::new();
-            for (group, lanes) in groups.of.iter_mut().zip(bundle.tame) {
+            for (g, (group, lanes)) in groups.of.iter_mut().zip(bundle.tame).enumerate() {
+                if g == round % 7 {
+                    // Not loaded: left by another tile.
+                    group.start = [V::splat(1e9); 3];
+                    continue;
+                }
                 let at: [[f32; 3]; 16] = std::array::from_fn(|_| {
                     let [x, y] = [4.0 * next(), 4.0 * next()];
                     [apex[0] + x, apex[1] + y, apex[2] + height + slope * x]
@@ -179,7 +187,8 @@ mod tests {
                 group.start = each(|a| V::new(at.map(|p| p[a] * groups.frame.scale)));
             }
             groups.starts = None;
-            let room = Room::of::<SETS>(&groups, &bundle).expect("starts");
+            let room = Room::of::<SETS>(&groups, &bundle, !(1 << (round % 7))).expect("starts");
+            assert!((0..3).all(|a| room.lo[a].abs() < 1e6 || room.lo[a].is_infinite()), "{room:?}");
             let inside = |p: [f32; 3]| (0..3).all(|a| room.lo[a] <= p[a] && p[a] <= room.hi[a]);
             for start in &starts {
                 let way: [f32; 3] = each(|a| start[a] - apex[a]);
@@ -192,6 +201,6 @@ mod tests {
         // Floors and ceilings are below and above all of the rays they throw back.
         assert!(floors > 20 && sides > 20, "{floors} {sides}");
         let none = Bundle { shared: Shared::Behind, tame: [0; GROUPS], ..Bundle::unsorted(&rays, 0, GROUPS) };
-        assert!(Room::of::<SETS>(&groups, &none).is_none());
+        assert!(Room::of::<SETS>(&groups, &none, u64::MAX).is_none());
     }
 }
