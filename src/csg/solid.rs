@@ -309,7 +309,7 @@ pub(super) fn tolerance<V: Lanes>(packet: &Packet<V>, size: V::Scalar, least: V:
     (distance * x.fast_min(y).fast_min(z)).fast_min(V::splat(V::Scalar::MAX))
 }
 
-/// Of those of a box.
+/// The largest coordinate of a box, without its sign.
 pub(super) fn largest_coordinate<S: Real>(bounds: &Aabb<S>) -> S {
     bounds.lo.iter().chain(&bounds.hi).fold(S::ZERO, |most, x| most.fast_max(x.abs()))
 }

@@ -7,7 +7,8 @@
 //! formula decides where rounding could matter, so its hits are those of the other engines, bit by bit ([`exact`]).
 //! Instances are entered by taking the tile's frame through their maps ([`place`]), or, where their triangles are finer than
 //! the rays, by the stream kernel ([`fine`]); shapes in them are tested ray by ray ([`shapes`]). To the stream kernel
-//! ([`super::stream`]) go blocks of rays without a common point, tiles whose rays are farther apart than triangles ([`density`]),
+//! ([`super::stream`]) go blocks of rays without a common point or too wide for a frame, tiles whose rays are in no order ([`mixed`]) or
+//! farther apart than triangles ([`density`]),
 //! and worlds with solids, with more shapes than triangles, or with maps too flat for f32; for `tile-exact` also all worlds
 //! with instances. There `tile` asks for answers of the plain test. Single odd rays go to the packet kernel.
 //!
