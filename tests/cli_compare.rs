@@ -70,6 +70,30 @@ fn levels_have_the_classes_of_pixcmp() {
     assert!(text.contains("576 off by many"), "{text}");
 }
 
+/// 16 bits are finer than the levels of a display: what differs within one of them is different.
+#[test]
+fn deep_pngs_are_not_rounded_to_levels() {
+    let dir = folder();
+    let deep = |name: &str, value: u16| {
+        let file = std::fs::File::create(dir.path().join(name)).expect("a file");
+        let mut encoder = ::png::Encoder::new(file, 16, 12);
+        encoder.set_color(::png::ColorType::Grayscale);
+        encoder.set_depth(::png::BitDepth::Sixteen);
+        let mut body = encoder.write_header().expect("a header");
+        body.write_image_data(&value.to_be_bytes().repeat(192)).expect("pixels");
+        body.finish().expect("written");
+    };
+    deep("a.png", 188 * 257);
+    deep("b.png", 188 * 257 + 100);
+    let report = run(&dir, "compare a.png b.png --max-different 0 --json", 1).json();
+    assert_eq!((report["domain"].as_str(), report["unit"].as_str()), (Some("linear"), Some("ulp")));
+    assert!(report["rmse"].as_f64().expect("a number") > 1e-4 && report["levels"]["exact"] == 576, "{report}");
+    run(&dir, "compare a.png a.png --max-different 0 --max-rmse 0", 0);
+    // Beside a file of levels it is shown as a display shows it.
+    let shown = run(&dir, "compare half.png b.png --max-different 0 --json", 0).json();
+    assert_eq!((shown["domain"].as_str(), shown["unit"].as_str()), (Some("display"), Some("level")));
+}
+
 #[test]
 fn limits_decide_the_exit_code() {
     let dir = folder();

@@ -23,7 +23,8 @@ Examples:
   lanecast compare scalar.npy tile.npy --scene model.ply --rays rays.npy
 
 Pictures: .exr (any channels), .png, .pfm, .pix, .npy (height, width[, channels]); A is the reference. Figures of \
-the colours are of display values (0 to 1) if a file holds 8-bit levels, else of linear light. Classes count samples \
+the colours are of display values (0 to 1) if a file holds 8-bit levels, else of linear light, which a PNG of 16 bits is \
+taken for. Classes count samples \
 that are the same, one step apart, or farther; steps are 8-bit levels, or representable floats (ulp).
 Hits: files that `trace --hits` wrote. With --scene and --rays, the f64 oracle judges both answers of every ray \
 whose bits differ; a mismatch is explained if the geometry is within a few roundings of the answer.

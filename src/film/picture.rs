@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 /// What the samples of a file mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// Levels of a display (the film holds them decoded to linear light).
+    /// 8-bit levels of a display (the film holds them decoded to linear light).
     Levels,
     /// Levels that are linear light times 255, as `.pix` files hold them.
     PlainLevels,
@@ -23,16 +23,22 @@ pub enum Encoding {
 type Size = Option<(u32, u32)>;
 
 /// A reader of one kind of file.
-type Reader = fn(&Path, Size) -> Result<Film>;
+type Reader = fn(&Path, Size) -> Result<Picture>;
 
 /// Kinds of files by the end of their name. A further kind is a line here.
-const KINDS: [(&str, Encoding, Reader); 5] = [
-    ("exr", Encoding::Linear, |path, _| exr::read(path)),
-    ("png", Encoding::Levels, |path, _| png::read(path)),
-    ("pfm", Encoding::Linear, |path, _| pfm::read(path)),
-    ("npy", Encoding::Linear, |path, _| npy::read_film(path)),
-    ("pix", Encoding::PlainLevels, pix::read),
+const KINDS: [(&str, Reader); 5] = [
+    ("exr", |path, _| exr::read(path).map(Picture::linear)),
+    ("png", |path, _| levels_or_light(path)),
+    ("pfm", |path, _| pfm::read(path).map(Picture::linear)),
+    ("npy", |path, _| npy::read_film(path).map(Picture::linear)),
+    ("pix", |path, size| Ok(Picture { film: pix::read(path, size)?, encoding: Encoding::PlainLevels })),
 ];
+
+/// A PNG. One of 16 bits is finer than the levels of a display: rounded to them, different files would be called the same.
+fn levels_or_light(path: &Path) -> Result<Picture> {
+    let (film, bits) = png::read_with_depth(path)?;
+    Ok(Picture { film, encoding: if bits > 8 { Encoding::Linear } else { Encoding::Levels } })
+}
 
 /// A film with what its samples mean.
 #[derive(Clone, Debug)]
@@ -48,9 +54,9 @@ pub fn is_named(path: &Path) -> bool {
     kind(path).is_some()
 }
 
-fn kind(path: &Path) -> Option<&'static (&'static str, Encoding, Reader)> {
+fn kind(path: &Path) -> Option<Reader> {
     let end = path.extension()?.to_str()?.to_ascii_lowercase();
-    KINDS.iter().find(|(name, ..)| *name == end)
+    KINDS.iter().find(|(name, _)| *name == end).map(|(_, read)| *read)
 }
 
 /// Reads a picture; `size` is that of a file that does not say its own (`.pix`; without it such a file is a square).
@@ -58,15 +64,19 @@ fn kind(path: &Path) -> Option<&'static (&'static str, Encoding, Reader)> {
 /// # Errors
 /// Those of its reader; [`Error::Usage`] for a name that no reader knows.
 pub fn read(path: &Path, size: Size) -> Result<Picture> {
-    let Some((_, encoding, read)) = kind(path) else {
-        let names: Vec<String> = KINDS.iter().map(|(name, ..)| format!(".{name}")).collect();
+    let Some(read) = kind(path) else {
+        let names: Vec<String> = KINDS.iter().map(|(name, _)| format!(".{name}")).collect();
         let what = format!("{}: expected a picture: a file named {}", path.display(), names.join(", "));
         return Err(Error::Usage(what));
     };
-    Ok(Picture { film: read(path, size)?, encoding: *encoding })
+    read(path, size)
 }
 
 impl Picture {
+    fn linear(film: Film) -> Self {
+        Self { film, encoding: Encoding::Linear }
+    }
+
     /// Its colours in linear light: planes `R G B`, or one plane `Y` three times. `None` if it has neither as floats.
     pub fn rgb(&self) -> Option<Rgb<'_>> {
         let film = &self.film;

@@ -84,11 +84,23 @@ pub fn read(path: &Path) -> Result<Film> {
     parse(path, &input::read(path)?)
 }
 
+/// [`read`], and the bits of a sample: 8 also for files of fewer, 16 for those finer than the levels of a display.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with_depth(path: &Path) -> Result<(Film, u8)> {
+    decode(path, &input::read(path)?)
+}
+
 /// [`read`] of bytes in memory; `file` is only for messages.
 ///
 /// # Errors
 /// [`Error::Input`] for a damaged file or one whose header claims more pixels than its length can hold.
 pub fn parse(file: &Path, bytes: &[u8]) -> Result<Film> {
+    decode(file, bytes).map(|(film, _)| film)
+}
+
+fn decode(file: &Path, bytes: &[u8]) -> Result<(Film, u8)> {
     let bad = |e: png::DecodingError| Error::whole(file, format!("not a readable PNG: {e}"));
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(Transformations::EXPAND);
@@ -104,7 +116,9 @@ pub fn parse(file: &Path, bytes: &[u8]) -> Result<Film> {
     let mut pixels = vec![0; size];
     let frame = reader.next_frame(&mut pixels).map_err(bad)?;
     pixels.truncate(frame.buffer_size());
-    film_of(width, height, frame.color_type, frame.bit_depth, &pixels).map_err(|e| Error::whole(file, e.to_string()))
+    let film = film_of(width, height, frame.color_type, frame.bit_depth, &pixels);
+    let bits = if frame.bit_depth == BitDepth::Sixteen { 16 } else { 8 };
+    film.map(|film| (film, bits)).map_err(|e| Error::whole(file, e.to_string()))
 }
 
 fn has_alpha(color: ColorType) -> bool {
