@@ -94,6 +94,29 @@ fn deep_pngs_are_not_rounded_to_levels() {
     assert_eq!((shown["domain"].as_str(), shown["unit"].as_str()), (Some("display"), Some("level")));
 }
 
+/// Coverage is no colour: levels are three per pixel, whether both files, one or none have it.
+#[test]
+fn levels_are_of_colours_whatever_is_covered() {
+    let dir = folder();
+    for (name, coverage) in [("opaque", 1.0), ("thin", 0.5)] {
+        let mut film = Film::full(16, 12).expect("a size");
+        for (plane, value) in [("R", 0.5 * coverage), ("G", 0.5 * coverage), ("B", 0.5 * coverage), ("A", coverage)] {
+            film.push(plane, PlaneData::F32(vec![value; 192])).expect("a plane");
+        }
+        png::write(&dir.path().join(format!("{name}.png")), &film, 0.0).expect("written");
+    }
+    for files in ["half.png opaque.png", "opaque.png half.png", "opaque.png thin.png", "half.png half.png"] {
+        let report = run(&dir, &format!("compare {files} --max-different 0 --json"), 0).json();
+        assert_eq!(
+            (report["unit"].as_str(), report["classes"]["exact"].as_u64()),
+            (Some("level"), Some(576)),
+            "{files}"
+        );
+    }
+    let report = run(&dir, "compare opaque.png quarter.png --max-different 0 --json", 1).json();
+    assert_eq!((report["unit"].as_str(), report["classes"]["beyond"].as_u64()), (Some("level"), Some(576)));
+}
+
 #[test]
 fn limits_decide_the_exit_code() {
     let dir = folder();

@@ -30,7 +30,7 @@ Hits: files that `trace --hits` wrote. With --scene and --rays, the f64 oracle j
 whose bits differ; a mismatch is explained if the geometry is within a few roundings of the answer.
 A sample that is not finite (NaN, infinite) in one file only is beyond every limit on a figure of the colours.
 Limits on single samples (ulp, beyond, different) are of all planes of both files: a plane that only one has breaks them. \
-Samples that are 8-bit levels are of the colours only.
+Samples that are 8-bit levels are of the colours only, not of their coverage (A); a picture without A counts as opaque.
 Exit code 1: a limit given here is passed, a mismatch of hits is not explained, or sizes differ, or two EXR \
 files hold different parts (data windows) of one picture (display window); other files have no windows, and pixels are \
 compared in order.";

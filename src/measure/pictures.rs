@@ -42,14 +42,14 @@ pub struct PictureReport {
     /// Figures of the colours, if both have some.
     #[serde(flatten)]
     pub colors: Option<Colors>,
-    /// Samples that are the same, one step apart, or farther: in 8-bit levels if a file has levels, else in units in the
-    /// last place over all planes that both have.
+    /// Samples that are the same, one step apart, or farther: of the colours in 8-bit levels if a file has levels, else in
+    /// units in the last place over all planes that both have.
     pub classes: Classes,
     /// The unit of `classes`: `level` or `ulp`.
     pub unit: &'static str,
     /// Largest distance in units in the last place over all planes that both have; `None` for levels.
     pub max_ulp: Option<u64>,
-    /// The 8-bit levels that a display would get (for files of levels: their own).
+    /// The 8-bit levels of red, green and blue that a display would get (for files of levels: their own).
     pub levels: Option<Classes>,
     /// Every plane that both files have.
     pub planes: Vec<PlaneDifference>,
@@ -112,9 +112,8 @@ pub fn compare(a: &Picture, b: &Picture, options: &Options) -> Result<(PictureRe
     let (mut report, mut maps, mut levels) = (None, None, None);
     if let Some((rgb_a, rgb_b)) = colors {
         let [bytes_a, bytes_b] = [a.levels(options.exposure, plain)?, b.levels(options.exposure, plain)?];
-        if bytes_a.channels == bytes_b.channels {
-            levels = Some(level_classes(&bytes_a.bytes, &bytes_b.bytes));
-        }
+        // Levels of colours, whatever the files say of coverage: a picture without A is an opaque one.
+        levels = Some(level_classes(&colors_of(&bytes_a), &colors_of(&bytes_b)));
         let far = |i: usize| {
             let level = |p: &Pixels8, c: usize| p.bytes[i * p.channels + c];
             (0..3).map(|c| level(&bytes_a, c).abs_diff(level(&bytes_b, c))).max().unwrap_or(0)
@@ -144,6 +143,11 @@ pub fn compare(a: &Picture, b: &Picture, options: &Options) -> Result<(PictureRe
         unmatched,
     };
     Ok((report, maps))
+}
+
+/// Red, green and blue of every pixel.
+fn colors_of(pixels: &Pixels8) -> Vec<u8> {
+    pixels.bytes.chunks_exact(pixels.channels).flat_map(|pixel| &pixel[..3]).copied().collect()
 }
 
 /// Checks that the same sample of both pictures is the same pixel, as far as the files say.
