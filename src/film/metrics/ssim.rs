@@ -17,7 +17,8 @@ const K1: f64 = 0.01;
 const K2: f64 = 0.03;
 
 /// Mean structural similarity of two pictures whose values span `range` (1 for values from 0 to 1): 1 for the same
-/// pictures. `None` for pictures smaller than the window.
+/// pictures. `None` for pictures smaller than the window. A sample that is NaN or the same infinity in both counts as 0 in both;
+/// NaN if one is not finite otherwise.
 ///
 /// # Errors
 /// Pictures of different sizes.
@@ -73,7 +74,9 @@ fn channel(a: &[f32], b: &[f32], width: usize, range: f64) -> f64 {
 fn moments(a: &[f32], b: &[f32]) -> [f64; 5] {
     let mut m = [0.0; 5];
     for ((w, &a), &b) in weights().iter().zip(a).zip(b) {
-        let (a, b) = (f64::from(a), f64::from(b));
+        // What is the same in both tells them not apart, though nothing can be computed of it.
+        let is_same = !a.is_finite() && (a == b || a.is_nan() && b.is_nan());
+        let (a, b) = if is_same { (0.0, 0.0) } else { (f64::from(a), f64::from(b)) };
         m.iter_mut().zip([a, b, a * a, b * b, a * b]).for_each(|(to, x)| *to += w * x);
     }
     m
@@ -103,5 +106,14 @@ mod tests {
         assert!((of(&a, &a, 20).unwrap() - 1.0).abs() < 1e-12);
         assert!(of(&a, &inverse, 20).unwrap() < -0.5);
         assert_eq!(of(&[0.0; 100], &[0.0; 100], 10), None);
+    }
+    /// What is not finite in both says nothing; in one only, it is beyond every limit.
+    #[test]
+    fn samples_that_are_no_numbers() {
+        let mut a: Vec<f32> = (0..400).map(|i| ((i * 37 + i / 20 * 11) % 16) as f32 / 15.0).collect();
+        let whole = a.clone();
+        (a[3], a[205], a[399]) = (f32::NAN, f32::INFINITY, f32::NEG_INFINITY);
+        assert!((of(&a, &a, 20).unwrap() - 1.0).abs() < 1e-12);
+        assert!(of(&a, &whole, 20).unwrap().is_nan() && of(&whole, &a, 20).unwrap().is_nan());
     }
 }
