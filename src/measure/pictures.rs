@@ -87,7 +87,7 @@ pub struct Colors {
 /// Where the pictures differ, row-major.
 #[derive(Clone, Debug)]
 pub struct Maps {
-    /// Largest absolute error of the three colours, in the report's domain.
+    /// Largest absolute error of the three colours, in the report's domain; NaN where one is NaN in one picture only.
     pub error: Vec<f32>,
     /// LDR-FLIP.
     pub flip: FlipMap,
@@ -226,12 +226,12 @@ fn colored(
     for (x, y) in va.planes.into_iter().zip(vb.planes) {
         for (i, (&x, &y)) in x.iter().zip(y).enumerate() {
             sums.add(x.into(), y.into());
-            error[i] = error[i].max((y - x).abs());
+            error[i] = largest(error[i], distance(x, y));
         }
     }
-    let largest = || va.planes.into_iter().flatten().filter(|x| x.is_finite()).fold(0.0f32, |most, x| most.max(*x));
+    let greatest = || va.planes.into_iter().flatten().filter(|x| x.is_finite()).fold(0.0f32, |most, x| most.max(*x));
     // A black reference has no white of its own.
-    let brightest = || Some(largest()).filter(|&x| x > 0.0).unwrap_or(1.0);
+    let brightest = || Some(greatest()).filter(|&x| x > 0.0).unwrap_or(1.0);
     let peak = options.peak.unwrap_or_else(|| if domain == Domain::Display { 1.0 } else { brightest().into() });
     let errors = sums.errors();
     let colors = Colors {
@@ -248,6 +248,16 @@ fn colored(
         hdr_flip: hdr.as_ref().map(FlipMap::mean),
     };
     Ok((colors, ColorMaps { error, flip, hdr_flip: hdr }))
+}
+
+/// Absolute difference, 0 for two NaN and for the same infinity as the figures take them.
+fn distance(x: f32, y: f32) -> f32 {
+    if x == y || x.is_nan() && y.is_nan() { 0.0 } else { (y - x).abs() }
+}
+
+/// The larger one, but NaN if one is, which [`f32::max`] would hide.
+fn largest(x: f32, y: f32) -> f32 {
+    if x > y || x.is_nan() { x } else { y }
 }
 
 /// What [`colored`] finds per pixel.
@@ -315,6 +325,20 @@ mod tests {
         let film = difference_film(&a, &b, Some(&maps)).unwrap();
         assert_eq!((film.f32_plane("R").unwrap()[0], film.f32_plane("diff.Z").unwrap()[0]), (-0.25, 2.0));
         assert!(film.f32_plane("hdr_flip").is_some());
+    }
+
+    /// NaN in one picture only is no small error, whichever colour it is in; in both it is none.
+    #[test]
+    fn the_map_of_errors_shows_what_is_no_number() {
+        let [a, mut b] = [0.5, 0.25].map(|value| picture(Encoding::Linear, value, 1.0));
+        for (c, i) in [(0, 7), (2, 9)] {
+            let PlaneData::F32(plane) = &mut b.film.planes[c].data else { panic!("floats") };
+            plane[i] = f32::NAN;
+        }
+        let error = |a: &Picture, b: &Picture| compare(a, b, &Options::default()).unwrap().1.unwrap().error;
+        let map = error(&a, &b);
+        assert!(map[7].is_nan() && map[8] == 0.25 && map[9].is_nan(), "{:?}", &map[..10]);
+        assert_eq!(error(&b, &b), [0.0; 144]);
     }
 
     /// White is 1 where the reference is black: equal pictures are equal, and 0.5 is off by 10 log10(1 / 0.25) = 6.02 dB; SSIM of
