@@ -175,6 +175,27 @@ fn other_kinds_of_scenes() {
     assert!(ended.json()["triangles"].as_u64().expect("a number") > 1000, "{}", ended.out);
 }
 
+/// Coordinates of 30000 leave f32 steps of 0.002: the default gives way to that, a bound is told of what was asked for, and flags
+/// have no vertices.
+#[test]
+fn far_from_the_origin_only_what_was_asked_for_is_refused() {
+    let dir = folder();
+    std::fs::write(dir.path().join("block.kdl"), "box size=1 { translate 10000 20000 30000 }\n").expect("a scene");
+    for line in ["-o a.stl", "-o a.stl --cells 20", "-o a.stl --voxels 20", "-o a.npy --voxels 300", "-o a.npy"] {
+        let ended = convert(dir.path(), &format!("{line} --json"));
+        assert_eq!(ended.code, Some(0), "{line}: {}", ended.err);
+        let volume = ended.json()["volume"].as_f64().expect("a number");
+        assert!((volume - 1.0).abs() < 0.05, "{line}: {volume}");
+    }
+    let refuse = |line: &str, what: &str| refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);
+    refuse("convert block.kdl -o b.stl --tolerance 0.001", "--tolerance: expected a number of at least 7.1");
+    refuse("convert block.kdl -o b.stl --cells 1000", "--cells 1000: finer than the digits of f32");
+    refuse("convert block.kdl -o b.stl --voxels 1000", "expected at most 279");
+    std::fs::write(dir.path().join("block.kdl"), "box size=1 { translate 0 0 1e8 }\n").expect("a scene");
+    refuse("convert block.kdl -o b.stl", "move them to the origin");
+    assert!(!dir.path().join("b.stl").exists());
+}
+
 #[test]
 fn refusals_leave_no_files() {
     let dir = folder();

@@ -15,6 +15,8 @@ use crate::scene::mesh::Mesh;
 
 /// Tolerance unless `--tolerance` says otherwise: this part of the box's diagonal.
 const DEFAULT_TOLERANCE: f64 = 1.0 / 256.0;
+/// Steps of the last digit that solids must be wide: as many as the first grid has cells.
+const FEWEST_DIGITS: f64 = 16.0;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -54,7 +56,8 @@ pub struct ConvertArgs {
     /// Convert only the solid or `define` of this name; may be given more than once
     #[arg(long, value_name = "NAME")]
     solid: Vec<String>,
-    /// Largest distance from the true surface, scene units [default: 1/256 of the diagonal of the solids' box]
+    /// Largest distance from the true surface, scene units [default: 1/256 of the diagonal of the solids' box, or what f32
+    /// tells apart where they are]
     #[arg(long, value_name = "LENGTH", conflicts_with_all = ["cells", "voxels"])]
     tolerance: Option<f64>,
     /// Cells along the longest side, instead of a tolerance: a mesh from one grid
@@ -127,18 +130,11 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
         if solids.left_out > 0 {
             args.output.say(&format!("warning: {} meshes and discs have no inside and are left out", solids.left_out));
         }
-        let tolerance = args.tolerance.unwrap_or(DEFAULT_TOLERANCE * (solids.hi - solids.lo).length());
-        // Below this the digits of f32, in which vertices are written, do not suffice.
-        let least = 2.0 * f64::from(f32::EPSILON) * solids.lo.abs().max(solids.hi.abs()).max_element();
-        if !(tolerance >= least && tolerance.is_finite()) {
-            return Err(Error::Usage(format!(
-                "--tolerance: expected a number of at least {least:e}, found {tolerance}"
-            )));
-        }
+        let side = (solids.hi - solids.lo).max_element();
+        let tolerance = tolerance(args, &solids, kind.is_some())?;
         let fineness = Fineness { tolerance, cells: args.cells, memory: args.memory.saturating_mul(1 << 20) };
         let bar = args.output.progress_bar(0, "converting");
         let watch = Watch { stop: &stopped, more: &|steps| bar.inc_length(steps), step: &|| bar.inc(1) };
-        let side = (solids.hi - solids.lo).max_element();
         let spacing = args.voxels.map_or(voxels::spacing_for(tolerance), |n| side / f64::from(n));
         match kind {
             Some(kind) if args.voxels.is_none() => {
@@ -162,6 +158,32 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
             }
         }
     })
+}
+
+/// The tolerance, given or not. Where vertices are written, the digits of `f32` must tell them apart: that bounds what was
+/// asked for, whether it is a tolerance, cells or voxels. Flags are computed in `f64`.
+fn tolerance(args: &ConvertArgs, solids: &Solids, has_vertices: bool) -> Result<f64> {
+    let fail = |what: String| Err(Error::Usage(what));
+    let (epsilon, name) = if has_vertices { (f64::from(f32::EPSILON), "f32") } else { (f64::EPSILON, "f64") };
+    let extent = solids.lo.abs().max(solids.hi.abs()).max_element();
+    let (side, digit) = ((solids.hi - solids.lo).max_element(), epsilon * extent);
+    if let Some(tolerance) = args.tolerance.filter(|x| !(*x >= 2.0 * digit && x.is_finite())) {
+        return fail(format!("--tolerance: expected a number of at least {:e}, found {tolerance}", 2.0 * digit));
+    }
+    if side < FEWEST_DIGITS * digit {
+        let what = format!("the solids are {side:e} wide, but their coordinates go to {extent:e}");
+        return fail(format!("{what}: the digits of {name} do not tell them apart; move them to the origin"));
+    }
+    let counts = [("--cells", args.cells), ("--voxels", args.voxels)];
+    for (option, count) in counts.into_iter().filter_map(|(option, count)| Some((option, count?))) {
+        let most = side / digit;
+        if f64::from(count) > most {
+            let what = format!("{option} {count}: finer than the digits of {name} where the solids are");
+            return fail(format!("{what}; expected at most {}", most.floor()));
+        }
+    }
+    let default = DEFAULT_TOLERANCE * (solids.hi - solids.lo).length();
+    Ok(args.tolerance.unwrap_or(default.max(2.0 * digit)))
 }
 
 /// How a mesh was made.
