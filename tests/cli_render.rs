@@ -27,7 +27,8 @@ fn a_square_is_where_it_should_be_with_all_planes_in_exr() {
     assert_eq!((&report["complete"], &report["rays"]["primary"]), (&true.into(), &4096.into()));
     assert_eq!(files(dir.path()), ["out.exr", "square.ply"]);
     let film = exr::read(&dir.path().join("out.exr")).expect("an EXR file");
-    assert_eq!(film.planes.len(), 4 + (1 + 3 + 3 + 1 + 1 + 1) + (3 + 3 + 3 + 3 + 1 + 1 + 1));
+    assert_eq!(film.planes.len(), 4 + (1 + 3 + 3 + 1 + 1 + 1) + (3 + 3 + 1 + 1 + 1));
+    assert!(film.plane("direct.R").is_none() && film.plane("cost.nodes").is_some(), "only what whitted has");
     let (alpha, z) = (film.f32_plane("A").expect("A"), film.f32_plane("Z").expect("Z"));
     for (i, (&a, &z)) in alpha.iter().zip(z).enumerate() {
         // The square covers the middle quarter each way: pixels 24 to 39.
@@ -91,6 +92,8 @@ fn refusals_say_what_is_expected() {
         ("render square.ply", "--output"),
         ("render square.ply -o a.exr --integrator normal", "did you mean `normals`?"),
         ("render square.ply -o a.exr --aov M", "unknown AOV `M`"),
+        ("render square.ply -o a.exr --aov all,direct", "--aov direct: whitted has no such plane, only path"),
+        ("render square.ply -o a.exr --integrator path --aov cost.nodes", "--aov cost.nodes: path has no such plane"),
         ("render square.ply -o a.png --aov Z", "needs .exr or .npy"),
         ("render square.ply -o a.exr --engine skalar", "scalar"),
         ("render square.ply -o a.exr --tile 9", "8, 16 or 32"),

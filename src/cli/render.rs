@@ -103,8 +103,8 @@ pub struct RenderArgs {
     /// Length of occlusion rays as a fraction of the scene's diagonal
     #[arg(long, value_name = "FRACTION", default_value_t = 0.2, allow_negative_numbers = true)]
     ao_radius: f64,
-    /// Extra planes: Z, N, Ns, P, albedo, direct, indirect, id.instance, id.primitive, id.material, variance, samples,
-    /// cost.nodes, all of these, or cryptomatte
+    /// Extra planes: Z, N, Ns, P, albedo, id.instance, id.primitive, id.material, variance, samples, direct and indirect (path
+    /// only), cost.nodes (neither path nor rt), all of these that the integrator has, or cryptomatte
     #[arg(long, value_name = "LIST", default_value = "")]
     aov: String,
     /// Brightness of PNG and .pix files: colours times 2^STOPS
@@ -282,7 +282,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         depth: args.depth.unwrap_or(integrator.depth()),
         ao_samples: args.ao_samples,
         ao_radius: args.ao_radius,
-        aovs: Aov::parse_list(&args.aov)?,
+        aovs: Aov::parse_list_of(&args.aov, integrator)?,
         levels: args.holds_levels().then_some(args.exposure),
         count: args.output.verbose > 0,
     };

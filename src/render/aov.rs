@@ -2,6 +2,7 @@
 
 use super::pixels::Pixel;
 use crate::error::{Error, Result, nearest_name};
+use crate::shade::Integrator;
 
 /// One plane of a film.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +56,7 @@ pub enum Aov {
     Position,
     /// `Ns.X Ns.Y Ns.Z`: unit shading normal, on the side of the geometric one; 0 where nothing was hit.
     ShadingNormal,
-    /// `direct.R direct.G direct.B`: light seen itself or scattered once ([`crate::shade::Integrator::Path`] only).
+    /// `direct.R direct.G direct.B`: light seen itself or scattered once ([`Integrator::Path`] only).
     Direct,
     /// `indirect.R indirect.G indirect.B`: the rest of the radiance (the same).
     Indirect,
@@ -65,7 +66,8 @@ pub enum Aov {
     Variance,
     /// `samples`: number of samples, u32.
     Samples,
-    /// `cost.nodes`: node visits per primary ray (see [`crate::shade::FirstHit::nodes`]).
+    /// `cost.nodes`: node visits per primary ray (see [`crate::shade::FirstHit::nodes`]); not with [`Integrator::Path`] and
+    /// [`Integrator::Rt`].
     Cost,
     /// `cryptoObject00.R` and so on, `cryptoMaterial00.R` and so on: ids and coverages of what a pixel shows
     /// ([`crate::film::cryptomatte`]).
@@ -156,6 +158,30 @@ impl Aov {
         }
     }
 
+    /// Whether pictures of `integrator` have it: of others its planes would be zeros, or hold what is something else.
+    pub fn is_of(self, integrator: Integrator) -> bool {
+        match self {
+            Self::Direct | Self::Indirect => integrator == Integrator::Path,
+            Self::Cost => !matches!(integrator, Integrator::Path | Integrator::Rt),
+            _ => true,
+        }
+    }
+
+    /// [`Self::parse_list`] for a picture of `integrator`: `all` are those that it has.
+    ///
+    /// # Errors
+    /// As [`Self::parse_list`], and one that it has not by its name.
+    pub fn parse_list_of(list: &str, integrator: Integrator) -> Result<Vec<Self>> {
+        let (has, lacks): (Vec<_>, Vec<_>) = Self::parse_list(list)?.into_iter().partition(|aov| aov.is_of(integrator));
+        let is_named = |aov: &&Self| list.split(',').any(|name| name.trim() == aov.name());
+        if let Some(aov) = lacks.iter().find(is_named) {
+            let having = Integrator::ALL.into_iter().filter(|other| aov.is_of(*other)).map(Integrator::name);
+            let (name, having) = (integrator.name(), having.collect::<Vec<_>>().join(", "));
+            return Err(Error::Usage(format!("--aov {}: {name} has no such plane, only {having}", aov.name())));
+        }
+        Ok(has)
+    }
+
     /// Reads a comma-separated list; `all` is all but [`Self::Cryptomatte`]. The result is in the order of [`Aov::ALL`], each once.
     ///
     /// # Errors
@@ -191,5 +217,26 @@ mod tests {
         assert_eq!(Aov::parse_list("").unwrap(), []);
         let message = Aov::parse_list("albdo").unwrap_err().to_string();
         assert!(message.contains("did you mean `albedo`?"), "{message}");
+    }
+
+    #[test]
+    fn no_picture_has_planes_that_its_integrator_has_not() {
+        use Integrator::{Ao, Path, Rt, Whitted};
+        let of = Aov::parse_list_of;
+        assert_eq!(of("Z,direct,indirect", Path).unwrap(), [Aov::Z, Aov::Direct, Aov::Indirect]);
+        assert_eq!(of("cost.nodes", Ao).unwrap(), [Aov::Cost]);
+        for (integrator, lacks) in [
+            (Path, &[Aov::Cost][..]),
+            (Whitted, &[Aov::Direct, Aov::Indirect]),
+            (Rt, &[Aov::Cost, Aov::Direct, Aov::Indirect]),
+        ] {
+            let rest: Vec<Aov> = Aov::ALL[..13].iter().copied().filter(|aov| !lacks.contains(aov)).collect();
+            assert_eq!(of("all", integrator).unwrap(), rest, "{integrator:?}");
+            for aov in lacks {
+                let message = of(&format!("all, {}", aov.name()), integrator).unwrap_err().to_string();
+                assert!(message.contains("no such plane"), "{message}");
+            }
+        }
+        assert!(of("direct", Whitted).unwrap_err().to_string().ends_with("whitted has no such plane, only path"));
     }
 }
