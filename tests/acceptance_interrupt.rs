@@ -132,6 +132,8 @@ fn pictures_without_a_number_of_samples_can_be_stopped_too() {
         let Ended { code, out, err } = running.wait(LIMIT).ended;
         assert_eq!(code, Some(130), "{line}: {err}");
         assert!(out.contains("\"complete\":false"), "{line}: {out}");
+        assert!(out.contains(&format!("\"written\":{}", !wanted.is_empty())), "{line}: {out}");
+        assert_eq!(err.contains("written"), wanted.is_empty(), "{line}: {err}");
         let left: Vec<_> = files(dir.path()).into_iter().filter(|name| name != "turn.kdl").collect();
         assert_eq!(left, wanted, "{line}: {err}");
         wanted.iter().for_each(|name| std::fs::remove_file(dir.path().join(name)).expect("a file"));

@@ -351,7 +351,8 @@ fn picture<S: Shades>(
         world_to_ndc: Some(camera.world_to_ndc().transpose().to_cols_array_2d()),
     };
     // Without a finished tile there is nothing to show, and an older picture is worth more.
-    if output.is_complete() || partly && output.tiles_done > 0 {
+    let written = output.is_complete() || partly && output.tiles_done > 0;
+    if written {
         write_each(&args.files, &output.film, &info, args.exposure)?;
     }
     if let (true, Some(keeper)) = (output.is_complete(), &keeper) {
@@ -359,7 +360,7 @@ fn picture<S: Shades>(
     }
     let stats = world.stats();
     let (engine, precision, build_seconds) = (engine.name(), S::PRECISION, stats.build_seconds);
-    let made = Made { engine, precision, build_seconds, holds: Holds::new(&stats, description) };
+    let made = Made { engine, precision, build_seconds, holds: Holds::new(&stats, description), written };
     tell(args, &report(args, options, &output, &made), &output)?;
     if let Some(window) = window {
         window.wait(|| watch.stopped());

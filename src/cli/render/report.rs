@@ -28,6 +28,7 @@ pub(super) struct Report<'a> {
     samples_per_pixel: f64,
     seed: u64,
     complete: bool,
+    written: bool,
     tiles: (u64, u64),
     rays: Rays,
     holds: Holds,
@@ -48,12 +49,13 @@ struct Rays {
     total: u64,
 }
 
-/// What made a picture.
+/// What made a picture, and whether there are files of it.
 pub(super) struct Made {
     pub engine: &'static str,
     pub precision: &'static str,
     pub build_seconds: f64,
     pub holds: Holds,
+    pub written: bool,
 }
 
 /// What a scene holds in memory.
@@ -111,6 +113,7 @@ pub(super) fn report<'a>(
         samples_per_pixel,
         seed: options.seed,
         complete: output.is_complete(),
+        written: made.written,
         tiles: (output.tiles_done, output.tiles_total),
         rays: Rays {
             primary: rays.primary,
@@ -139,8 +142,10 @@ pub(super) fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput
         (false, _) if done == total => ", stopped before the samples sufficed".into(),
         (false, _) => format!(", only {done} of {total} tiles"),
     };
+    // Without a finished tile, that is said already.
+    let unwritten = if report.written || done == 0 { "" } else { ", not written" };
     args.output.say(&format!(
-        "{file}: {width}x{height}{part}, {} rays in {:.3} s with {} ({:.1} Mrays/s, shading included)",
+        "{file}: {width}x{height}{part}{unwritten}, {} rays in {:.3} s with {} ({:.1} Mrays/s, shading included)",
         rays.total, report.seconds, report.engine, report.mrays_per_s
     ));
     let (h, mib) = (&report.holds, |bytes: u64| bytes as f64 / f64::from(1 << 20));
