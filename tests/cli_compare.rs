@@ -48,6 +48,9 @@ fn pictures_have_figures_classes_and_maps() {
     let difference = exr::read(&dir.path().join("d.exr")).expect("an EXR");
     assert_eq!(difference.f32_plane("G").expect("G")[5], -0.25);
     assert!(difference.f32_plane("flip").expect("flip")[100] > 0.1);
+    let bytes = std::fs::read(dir.path().join("d.exr")).expect("a file");
+    let has = |name: &str| bytes.windows(name.len()).any(|window| window == name.as_bytes());
+    assert!(has("lanecast/revision") && !has("lanecast/seed") && !has("lanecast/rays") && !has("sceneHash"));
     let heat = png::read(&dir.path().join("heat.png")).expect("a PNG");
     assert_eq!((heat.width, heat.height), (16, 12));
 

@@ -52,6 +52,33 @@ fn the_view_is_the_rendered_picture() {
     }
 }
 
+/// A saved picture tells of what it shows, also after the view has moved on.
+#[test]
+fn saved_pictures_know_how_they_were_made() {
+    let dir = folder("spp 3\nwait\norbit 20 0\nspp 5\nsave seen.exr\nwait\nsave turned.exr\n");
+    view(dir.path(), "builtin:gallery --size 65x40 --engine packet8 --precision f32");
+    render(dir.path(), "builtin:gallery --size 65x40 --spp 3");
+    let attributes = |name: &str| {
+        let meta = ::exr::meta::MetaData::read_from_file(dir.path().join(name), false).expect("an EXR");
+        meta.headers[0].own_attributes.clone()
+    };
+    let [seen, turned, plain] = ["seen.exr", "turned.exr", "plain.exr"].map(attributes);
+    let told = |of: &::exr::meta::header::LayerAttributes, name: &str| {
+        format!("{:?}", of.other.get(&::exr::meta::attribute::Text::from(name)).expect(name))
+    };
+    for name in ["lanecast/sceneHash", "lanecast/spp", "lanecast/seed", "lanecast/isa", "lanecast/revision"] {
+        assert_eq!(told(&seen, name), told(&plain, name), "{name}");
+    }
+    assert_eq!(seen.world_to_camera, plain.world_to_camera);
+    assert_ne!(turned.world_to_camera, plain.world_to_camera);
+    let number = |name: &str| match seen.other.get(&::exr::meta::attribute::Text::from(name)) {
+        Some(::exr::meta::attribute::AttributeValue::F64(x)) => *x,
+        other => panic!("{name}: {other:?}"),
+    };
+    assert!(number("lanecast/rays") >= 3.0 * 65.0 * 40.0 && number("lanecast/renderSeconds") > 0.0);
+    assert!(told(&seen, "lanecast/lanes").contains('8') && told(&turned, "lanecast/spp").contains('5'));
+}
+
 /// Light that scatters more often than a mirror is followed: as deep as render goes, whether begun with or changed to.
 #[test]
 fn paths_are_as_long_as_those_of_render() {

@@ -9,7 +9,6 @@ use super::output::json_to_stdout;
 use super::picture::{target, write};
 use super::render::check_rt;
 use crate::error::{Error, Result};
-use crate::film::Film;
 use crate::film::exr::ImageInfo;
 use crate::lanes::compiled_isa;
 use crate::measure::env::REVISION;
@@ -23,6 +22,7 @@ use crate::view::action::View;
 use crate::view::meshes::Meshes;
 use crate::view::reload::{Setting, Source};
 use crate::view::script;
+use crate::view::shot::Shot;
 use crate::view::stage::{Look, Scene, Stage};
 use crate::view::studio::Studio;
 use crate::view::window;
@@ -86,7 +86,7 @@ pub fn run(args: &ViewArgs) -> Result<()> {
     let stage = pool.install(|| first(&source))?;
     args.output.warn(&stage.description().warnings);
     let view = view(args, &*stage)?;
-    let save = |path: &Path, film: &Film, view: &View| save(args, path, film, view);
+    let save = |path: &Path, shot: &Shot, exposure: f32| save(args, path, shot, exposure);
     let name = stage.description().name.clone();
     // A window has nothing to finish: there Ctrl-C ends the process at once.
     let stopped = if script.is_some() { stopped } else { || false };
@@ -168,21 +168,24 @@ fn view(args: &ViewArgs, stage: &dyn Stage) -> Result<View> {
     Ok(View { look, home, exposure: args.exposure, lenient: args.scene.options.lenient })
 }
 
-fn save(args: &ViewArgs, path: &Path, film: &Film, view: &View) -> Result<()> {
+fn save(args: &ViewArgs, path: &Path, shot: &Shot, exposure: f32) -> Result<()> {
     let target = target(&path.to_string_lossy()).map_err(Error::Usage)?;
-    let camera = view.look.camera()?;
+    let camera = shot.look.camera()?;
     let info = ImageInfo {
         software: concat!("lanecast ", env!("CARGO_PKG_VERSION")).into(),
         revision: REVISION.into(),
-        engine: view.look.options.engine.clone(),
+        scene_hash: shot.scene_hash.clone(),
+        engine: shot.engine.clone(),
         isa: compiled_isa().into(),
-        spp: view.look.options.spp,
-        seed: view.look.options.seed,
+        lanes: shot.lanes,
+        spp: shot.spp,
+        seed: shot.look.options.seed,
+        render_seconds: shot.seconds,
+        rays: shot.rays,
         world_to_camera: Some(camera.world_to_camera().transpose().to_cols_array_2d()),
         world_to_ndc: Some(camera.world_to_ndc().transpose().to_cols_array_2d()),
-        ..ImageInfo::default()
     };
-    write(&target, film, &info, view.exposure)?;
+    write(&target, &shot.film, &info, exposure)?;
     args.output.say(&format!("{}: saved", path.display()));
     Ok(())
 }

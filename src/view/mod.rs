@@ -8,6 +8,7 @@ pub mod meshes;
 pub mod pilot;
 pub mod reload;
 pub mod script;
+pub mod shot;
 pub mod stage;
 pub mod studio;
 pub mod term;

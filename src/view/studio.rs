@@ -11,14 +11,15 @@ use serde_json::{Value, json};
 use super::action::{Action, View};
 use super::reload::Source;
 use super::script::{Line, Step};
+use super::shot::Shot;
 use super::stage::Stage;
 use crate::error::{Error, Result, locked};
-use crate::film::{Film, Window, check_apart};
+use crate::film::{Window, check_apart};
 use crate::render::progressive::{self, Framebuffer, Viewer};
 use crate::render::{Progress, RenderOutput};
 
-/// Writes a picture: path, film, exposure.
-pub type Save<'a> = &'a (dyn Fn(&Path, &Film, &View) -> Result<()> + Sync);
+/// Writes a picture: path, picture, stops by which files of levels are brightened.
+pub type Save<'a> = &'a (dyn Fn(&Path, &Shot, f32) -> Result<()> + Sync);
 
 /// A scene, a view of it and the picture made last.
 pub struct Studio<'a> {
@@ -80,7 +81,7 @@ impl Studio<'_> {
     /// # Errors
     /// The first command that cannot be done, with its line; [`Error::Interrupted`] when stopped.
     pub fn run(&mut self, file: &Path, lines: &[Line], tell: &dyn Fn(&Value) -> Result<()>) -> Result<()> {
-        let mut last: Option<RenderOutput> = None;
+        let mut last: Option<Shot> = None;
         for Line { line, step } in lines {
             if (self.stopped)() {
                 return Err(Error::Interrupted);
@@ -98,7 +99,7 @@ impl Studio<'_> {
         Ok(())
     }
 
-    fn step(&mut self, step: &Step, last: &mut Option<RenderOutput>) -> Result<Option<Value>> {
+    fn step(&mut self, step: &Step, last: &mut Option<Shot>) -> Result<Option<Value>> {
         Ok(match step {
             Step::Do(action) => {
                 self.view.apply(action, &*self.stage)?;
@@ -112,11 +113,11 @@ impl Studio<'_> {
                 Some(json!({ "command": "click", "x": x, "y": y, "hit": picked }))
             }
             Step::Save(path) => {
-                let Some(output) = last else {
+                let Some(shot) = last else {
                     return Err(Error::Usage("nothing to save: expected `wait` or `frame` before".into()));
                 };
                 check_apart(path, &self.stage.description().inputs())?;
-                (self.save)(path, &output.film, &self.view)?;
+                (self.save)(path, shot, self.view.exposure)?;
                 None
             }
             Step::Reload(_) if !self.source.is_watched() => {
@@ -137,7 +138,11 @@ impl Studio<'_> {
         Ok(Made { output, first_seconds: first })
     }
 
-    fn shown(&self, command: &str, limit: Option<Duration>, last: &mut Option<RenderOutput>) -> Result<Value> {
+    fn shot(&self, output: RenderOutput) -> Shot {
+        Shot::new(output, &self.view.look, &*self.stage)
+    }
+
+    fn shown(&self, command: &str, limit: Option<Duration>, last: &mut Option<Shot>) -> Result<Value> {
         let Made { output, first_seconds } = self.picture(limit)?;
         let seconds = output.seconds;
         let said = json!({
@@ -148,7 +153,7 @@ impl Studio<'_> {
             "rays": output.rays.total(),
             "mrays_per_s": output.rays.total() as f64 / seconds.max(f64::MIN_POSITIVE) / 1e6,
         });
-        *last = Some(output);
+        *last = Some(self.shot(output));
         if (self.stopped)() { Err(Error::Interrupted) } else { Ok(said) }
     }
 
@@ -175,7 +180,7 @@ impl Studio<'_> {
     }
 
     /// Waits for a change, opens the scene anew, and makes the first picture of it. An error keeps what there was.
-    fn reload(&mut self, command: &str, patience: Duration, last: &mut Option<RenderOutput>) -> Result<Value> {
+    fn reload(&mut self, command: &str, patience: Duration, last: &mut Option<Shot>) -> Result<Value> {
         let limit = Instant::now() + patience;
         loop {
             let Some(changed) = self.source.wait(limit, self.stopped) else {
@@ -199,7 +204,7 @@ impl Studio<'_> {
             let made = self.picture(None)?;
             let first = made.first_seconds.unwrap_or(made.output.seconds);
             let since_save = changed.elapsed().as_secs_f64() - (made.output.seconds - first);
-            *last = Some(made.output);
+            *last = Some(self.shot(made.output));
             return Ok(json!({
                 "command": command,
                 "changed": true,

@@ -13,6 +13,8 @@ pub use write::{Compression, write};
 ///
 /// Matrices are `m[row][column]` and act on column vectors (`p' = M p`); the file gets Imath's row-vector form, which
 /// is the transpose. `worldToCamera` and `worldToNDC` are as OpenEXR's standard attributes describe them.
+///
+/// What is empty or 0 is not known and becomes no attribute; neither does the seed without samples, nor the time without rays.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImageInfo {
     /// Program and version; attribute `software`.

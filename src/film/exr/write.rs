@@ -106,24 +106,28 @@ fn layer_attributes(film: &Film, info: &ImageInfo) -> LayerAttributes {
     let mut attributes = LayerAttributes {
         // Inside the display window, whose size was checked against EXR's limit.
         layer_position: Vec2(window.x0 as i32, window.y0 as i32),
-        software_name: Some(text(&info.software)),
+        software_name: Some(&info.software).filter(|name| !name.is_empty()).map(|name| text(name)),
         world_to_camera: info.world_to_camera.map(imath),
         world_to_normalized_device: info.world_to_ndc.map(imath),
         ..LayerAttributes::default()
     };
     let int = |x: u32| AttributeValue::I32(i32::try_from(x).unwrap_or(i32::MAX));
-    for (name, value) in [
-        ("revision", AttributeValue::Text(text(&info.revision))),
-        ("sceneHash", AttributeValue::Text(text(&info.scene_hash))),
-        ("engine", AttributeValue::Text(text(&info.engine))),
-        ("isa", AttributeValue::Text(text(&info.isa))),
-        ("lanes", int(info.lanes)),
-        ("spp", int(info.spp)),
-        ("seed", AttributeValue::Text(text(&info.seed.to_string()))),
-        ("renderSeconds", AttributeValue::F64(info.render_seconds)),
-        ("rays", AttributeValue::F64(info.rays as f64)),
+    let words = |s: &str| AttributeValue::Text(text(s));
+    let (is_sampled, is_traced) = (info.spp > 0, info.rays > 0);
+    for (name, value, is_known) in [
+        ("revision", words(&info.revision), !info.revision.is_empty()),
+        ("sceneHash", words(&info.scene_hash), !info.scene_hash.is_empty()),
+        ("engine", words(&info.engine), !info.engine.is_empty()),
+        ("isa", words(&info.isa), !info.isa.is_empty()),
+        ("lanes", int(info.lanes), info.lanes > 0),
+        ("spp", int(info.spp), is_sampled),
+        ("seed", words(&info.seed.to_string()), is_sampled),
+        ("renderSeconds", AttributeValue::F64(info.render_seconds), is_traced),
+        ("rays", AttributeValue::F64(info.rays as f64), is_traced),
     ] {
-        attributes.other.insert(text(&format!("lanecast/{name}")), value);
+        if is_known {
+            attributes.other.insert(text(&format!("lanecast/{name}")), value);
+        }
     }
     for (name, value) in &film.texts {
         attributes.other.insert(text(name), AttributeValue::Text(text(value)));

@@ -203,12 +203,12 @@ impl App<'_> {
     }
 
     fn save_as(&self, extension: &str) {
-        let Some(film) = self.shared.look(|shown| shown.film.clone()) else { return };
+        let Some(shot) = self.shared.look(|shown| shown.shot.clone()) else { return };
         let free = |n: u32| PathBuf::from(format!("{}-{n:03}.{extension}", self.name));
         let Some(path) = (1..1000).map(free).find(|path| !Path::exists(path)) else {
             return self.say(Some("999 pictures are saved already".into()));
         };
-        let saved = (self.save)(&path, &film, &self.shared.wanted().view);
+        let saved = (self.save)(&path, &shot, self.shared.wanted().view.exposure);
         self.say(Some(saved.map_or_else(|e| e.to_string(), |()| format!("{} saved", path.display()))));
     }
 

@@ -9,11 +9,12 @@ use std::time::{Duration, Instant};
 
 use super::screen::Screen;
 use crate::error::locked;
-use crate::film::{Film, Window};
+use crate::film::Window;
 use crate::render::progressive::{Framebuffer, Step, Viewer};
 use crate::render::{Progress, RenderOutput};
 use crate::view::action::View;
 use crate::view::levels::Levels;
+use crate::view::shot::Shot;
 use crate::view::stage::Stage;
 
 /// Time of a frame while the view changes, and between two looks at one that goes on.
@@ -33,8 +34,8 @@ pub struct Wanted {
 pub struct Shown {
     /// The picture.
     pub screen: Screen,
-    /// Its planes, once it is as finished as it gets.
-    pub film: Option<Arc<Film>>,
+    /// What is saved of it, once it is as finished as it gets.
+    pub shot: Option<Arc<Shot>>,
     /// Share of the batches that are done.
     pub progress: f64,
     /// Million rays per second of the last frame, shading included.
@@ -120,21 +121,22 @@ impl Shared {
             done = generation;
             let frame = Frame::new(self, generation, wanted.view.exposure);
             match pool.install(|| wanted.stage.render(&wanted.view.look, &frame, &frame)) {
-                Ok(output) => self.finished(output, &frame),
+                Ok(output) => self.finished(output, &wanted, &frame),
                 Err(error) => locked(&self.shown).error = Some(error.to_string()),
             }
             (self.wake)();
         }
     }
 
-    fn finished(&self, output: RenderOutput, frame: &Frame<'_>) {
-        let film = Arc::new(output.film);
+    fn finished(&self, output: RenderOutput, wanted: &Wanted, frame: &Frame<'_>) {
+        let progress = output.tiles_done as f64 / output.tiles_total.max(1) as f64;
+        let shot = Arc::new(Shot::new(output, &wanted.view.look, &*wanted.stage));
         let shown = &mut *locked(&self.shown);
-        let window = film.window;
-        shown.screen.show(&film, frame.exposure, &self.levels, |x, y| window.index(x, y));
-        shown.film = Some(film);
-        shown.progress = output.tiles_done as f64 / output.tiles_total.max(1) as f64;
-        shown.mrays_per_s = output.rays.total() as f64 / output.seconds.max(f64::MIN_POSITIVE) / 1e6;
+        let window = shot.film.window;
+        shown.screen.show(&shot.film, frame.exposure, &self.levels, |x, y| window.index(x, y));
+        shown.progress = progress;
+        shown.mrays_per_s = shot.rays as f64 / shot.seconds.max(f64::MIN_POSITIVE) / 1e6;
+        shown.shot = Some(shot);
         shown.error = None;
     }
 }
