@@ -3,7 +3,7 @@
 mod binary;
 
 use binary::{SQUARE, files, lanecast, refused};
-use lanecast::film::{exr, npy, png};
+use lanecast::film::{Film, PlaneData, exr, npy, png};
 
 fn square() -> tempfile::TempDir {
     let dir = tempfile::tempdir().expect("a temporary folder");
@@ -138,6 +138,32 @@ fn scenes_without_anything_are_pictures() {
     run(&dir, "render empty.asc -o empty.pix --size 40x30 --rt-compat");
     let bytes = std::fs::read(dir.path().join("empty.pix")).expect("a picture");
     assert!(bytes.len() == 40 * 30 * 3 && bytes.chunks_exact(3).all(|pixel| pixel == [0, 0, 1]));
+}
+
+/// What an environment shows is part of the picture, black as it may be: no holes in the ground below a sky.
+#[test]
+fn dark_parts_of_an_environment_are_opaque() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    // Texels are blended: the ground begins well below the horizon.
+    let half = [[1.0; 64], [0.0; 64]].concat();
+    for (name, light) in [("half.exr", half), ("black.exr", vec![0.0; 128])] {
+        let mut film = Film::full(16, 8).expect("a size");
+        for plane in ["R", "G", "B"] {
+            film.push(plane, PlaneData::F32(light.clone())).expect("a plane");
+        }
+        exr::write(&dir.path().join(name), &film, &exr::ImageInfo::default(), exr::Compression::Zip).expect("written");
+        let camera = "camera \"m\" { eye 0 0 6; look-at 0 0 0; fov 60 }";
+        std::fs::write(dir.path().join("m.kdl"), format!("{camera}\nenvironment \"{name}\"\nsphere\n"))
+            .expect("a scene");
+        for integrator in ["whitted", "path --spp 2", "ao"] {
+            run(&dir, &format!("render m.kdl -o out.exr --size 32x32 --integrator {integrator}"));
+            let film = exr::read(&dir.path().join("out.exr")).expect("a picture");
+            let (red, alpha) = (film.f32_plane("R").expect("R"), film.f32_plane("A").expect("A"));
+            assert!(red[31 * 32] == 0.0, "{name} {integrator}: the ground is black");
+            let holes = alpha.iter().filter(|&&a| a != 1.0).count();
+            assert_eq!(holes > 0, integrator == "ao", "{name} {integrator}: {holes}");
+        }
+    }
 }
 
 /// Light goes through two faces of a box, however thin it is and from however far it is seen.

@@ -26,8 +26,8 @@ use crate::trace::{Engine, engine};
 /// A picture and what it took.
 #[derive(Clone, Debug)]
 pub struct RenderOutput {
-    /// Planes R, G, B (linear Rec.709, premultiplied), A (coverage: hits, and a background that is not black; not beside
-    /// [`RenderOptions::levels`]), then the wanted AOVs. Tiles not finished are black with alpha 0.
+    /// Planes R, G, B (linear Rec.709, premultiplied), A (coverage: hits, and an environment or a background that is not black;
+    /// not beside [`RenderOptions::levels`]), then the wanted AOVs. Tiles not finished are black with alpha 0.
     pub film: Film,
     /// Live rays traced, by kind.
     pub rays: RayCounts,

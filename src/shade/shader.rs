@@ -12,7 +12,7 @@ use super::look_lanes::{LookNumbers, numbers_of_sides};
 use super::meeting::{Meeting, met_lanes};
 use super::path::{PathMemory, Paths};
 use super::rt::Rt;
-use super::sample::{FirstHit, RayCounts, Samples};
+use super::sample::{FirstHit, RayCounts, Rgba, Samples};
 use super::spot::{Draw, Spot, Spots};
 use super::stats::{Clock, PathStats};
 use super::through::{Again, Through};
@@ -302,6 +302,13 @@ impl<'a, S: Real> Shader<'a, S> {
     /// The same if it is the same in all directions.
     pub(super) fn even_beyond(&self) -> Option<DVec3> {
         self.environment.is_none().then_some(self.background)
+    }
+
+    /// What a primary ray sees that leaves the scene where the radiance is `radiance`. A background that shines is part of the picture,
+    /// a black one stays transparent; an environment is a picture itself, the black in it, too.
+    pub(super) fn behind(&self, radiance: DVec3) -> Rgba {
+        let is_shown = self.environment.is_some() || self.background != DVec3::ZERO;
+        Rgba { radiance, alpha: f64::from(u8::from(is_shown)) }
     }
 
     /// As [`Self::intersect`], 16 rays at a time with counting kernels, which gives each block of 4 x 4 pixels its

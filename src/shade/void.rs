@@ -5,7 +5,6 @@ use glam::DVec3;
 use super::integrator::Integrator;
 use super::sample::{Rgba, Samples};
 use super::shader::{Shader, Workspace};
-use super::whitted;
 use crate::bvh::Bundle;
 use crate::camera::Range;
 use crate::lanes::Real;
@@ -38,7 +37,7 @@ impl<S: Real> Shader<'_, S> {
                 let radiance = DVec3::from(rt.surroundings::<S>()?.map(S::to_f64));
                 Some(Rgba { radiance: radiance + DVec3::ZERO, alpha: 1.0 })
             }
-            (Integrator::Whitted | Integrator::Rt, _) => self.even_beyond().map(whitted::background),
+            (Integrator::Whitted | Integrator::Rt, _) => self.even_beyond().map(|radiance| self.behind(radiance)),
             (Integrator::Ao | Integrator::Normals | Integrator::Depth, _) => Some(Rgba::default()),
             (Integrator::Path | Integrator::Cost, _) => None,
         }

@@ -9,7 +9,6 @@ use super::classic::refracted;
 use super::colors::Colors;
 use super::lights::Lamp;
 use super::meeting::met_lanes;
-use super::sample::Rgba;
 use super::shader::{Shader, Workspace};
 use super::spot::Spots;
 use super::vertices::{DIFFUSE, EMISSION, ETA, MIRROR, NORMAL, POSITION, THROUGH, Vertices};
@@ -51,11 +50,11 @@ impl<S: Real> Shader<'_, S> {
             }
             let missed = unmet & rays.live_lanes(first);
             if let Some(behind) = self.even_beyond() {
-                out.set_lanes::<S::Wide>(first, missed, background(behind));
+                out.set_lanes::<S::Wide>(first, missed, self.behind(behind));
                 continue;
             }
             for i in lanes_of(missed).map(|lane| first + lane) {
-                out.set(i, background(self.beyond(DVec3::from(rays.dir(i).map(S::to_f64)))));
+                out.set(i, self.behind(self.beyond(DVec3::from(rays.dir(i).map(S::to_f64)))));
             }
         }
         let mut memory = work.whitted.take().unwrap_or_default();
@@ -152,11 +151,6 @@ impl<S: Real> Shader<'_, S> {
             out.add(shadows.path[i] as usize, shadows.weight_of(i) * left);
         });
     }
-}
-
-/// A background that shines is part of the picture; a black one stays transparent.
-pub(super) fn background(radiance: DVec3) -> Rgba {
-    Rgba { radiance, alpha: f64::from(u8::from(radiance != DVec3::ZERO)) }
 }
 
 /// The mirrored and refracted rays of `level` that carry enough light into `next`, all mirrored ones first.

@@ -112,6 +112,12 @@ impl<'a, S: Real> Lights<'a, S> {
             .map_or(0.0, |i| self.alias.chance(i) * self.emitters[i].pdf(from, to, ng))
     }
 
+    /// Whether there is something behind the scene that pictures show, also where it is black: an environment, or a background
+    /// that is not.
+    pub fn are_behind(&self) -> bool {
+        self.sky.is_some() || self.background != DVec3::ZERO
+    }
+
     /// Radiance of all rays that leave the scene, and the density per solid angle with which [`Self::aim`] finds it, where
     /// they are the same for all directions.
     pub fn even(&self) -> Option<(DVec3, f64)> {

@@ -261,9 +261,13 @@ impl<'a, S: Real> Paths<'a, S> {
 
     /// The `lanes` of rays `first..first + N` of the wave have left the scene.
     fn leave(&self, first: usize, lanes: u32, bounce: u32, wave: &Wave<S>, out: &mut Samples) {
+        if bounce == 0 && self.lights.are_behind() {
+            lanes_of(lanes).for_each(|lane| out.colors.make_opaque(wave.path[first + lane] as usize));
+        }
         let mut shine = |i: usize, light: DVec3| {
             let path = wave.path[i] as usize;
             out.shine(path, bounce, light);
+            // A sun before nothing is seen all the same.
             if bounce == 0 && light != DVec3::ZERO {
                 out.colors.make_opaque(path);
             }
