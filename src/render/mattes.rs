@@ -101,8 +101,8 @@ impl<'a> Mattes<'a> {
         [hit.inst, part as u32, group as u32]
     }
 
-    /// What layer `layer` calls `thing`. Objects: group of the scene, name or kind of the part; where the group is
-    /// placed several times, the number of the instance after `@`.
+    /// What layer `layer` calls `thing`. Objects: group of the scene (of a scene file a `define`: a `group` there is no object, and its
+    /// label is not kept), name or kind of the part; where the group is placed several times, the number of the instance after `@`.
     fn name(&self, layer: usize, [first, part, group]: Thing) -> String {
         if layer == 1 {
             return self.description.materials.get(first as usize).map_or("default".into(), |m| m.name.clone());
