@@ -64,6 +64,23 @@ fn verify_explains_what_rounding_does_to_stretched_shapes() {
     }
 }
 
+/// Corners on a line in f64 that leave it when they are rounded to f32: of no area, whatever the precision, moved or not.
+#[test]
+fn triangles_on_a_line_are_dropped_in_every_precision() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let mesh = "v 1.44 -2.75 2.49\nv 1.9 -3.71 2.13\nv 1.67 -3.23 2.31\nv 5 0 0\nv 0 5 0\nv 0 0 5\nf 1 2 3\nf 4 5 6\n";
+    std::fs::write(dir.path().join("line.obj"), mesh).expect("a mesh");
+    std::fs::write(dir.path().join("moved.kdl"), "mesh \"line.obj\" { translate 0.3 7 0.1 }\n").expect("a scene");
+    for scene in ["line.obj", "moved.kdl"] {
+        for precision in ["f32", "f64"] {
+            let counts = run(&dir, &format!("info {scene} --precision {precision} --json")).json()["counts"].clone();
+            assert_eq!(counts["dropped_degenerate"], 1, "{scene} {precision}: {counts}");
+        }
+        let report = run(&dir, &format!("verify {scene} --rays 500 --json")).json();
+        assert_eq!(report["pass"], true, "{scene}: {report}");
+    }
+}
+
 #[test]
 fn bench_prints_a_table_and_writes_rows_facts_and_a_picture() {
     let dir = square();

@@ -64,9 +64,11 @@ impl Object {
                 PartKind::Mesh(mesh) => {
                     let base = object.positions.len() as u32;
                     object.positions.extend(mesh.positions.iter().map(|&p| part.to_object.transform_point3(p)));
-                    for triangle in &mesh.triangles {
+                    for (number, triangle) in mesh.triangles.iter().enumerate() {
                         let corners = triangle.map(|i| base + i);
-                        let proper = shapes::is_proper(corners.map(|i| object.positions[i as usize]));
+                        // Corners that lie on a line where they are described may leave it by the rounding of their placing.
+                        let proper = shapes::is_proper(mesh.corners(number))
+                            && shapes::is_proper(corners.map(|i| object.positions[i as usize]));
                         object.prims.push(if proper { Prim::Triangle(corners) } else { Prim::Dropped });
                     }
                 }

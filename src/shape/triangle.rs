@@ -54,7 +54,14 @@ impl Triangle {
     /// [`Degenerate`] triangles.
     pub fn record<S: Real>(corners: [DVec3; 3]) -> Result<[S; 9], Degenerate> {
         let numbers = Self::rounded(corners);
-        Self::check(&numbers).map(|()| numbers)
+        Self::check(&numbers)?;
+        if Self::is_flat(corners) { Err(Degenerate::ZeroArea) } else { Ok(numbers) }
+    }
+
+    /// Whether these corners lie on a line. Rounded to `f32` they may not; but what has no area where it is described is hit in no
+    /// precision.
+    pub fn is_flat(corners: [DVec3; 3]) -> bool {
+        Self::check(&Self::rounded::<f64>(corners)) == Err(Degenerate::ZeroArea)
     }
 
     /// Corners rounded to `S`.

@@ -61,7 +61,8 @@ impl Triangles {
         self.vertices.extend(mesh.positions.iter().map(|&p| rounded(placed(to_space, local(p)))));
         for (i, triangle) in mesh.triangles.iter().enumerate() {
             let corners = triangle.map(|v| self.vertices[(base + v) as usize]);
-            let kept = Triangle::record::<f32>(mesh.corners(i).map(local)).is_ok();
+            let described = mesh.corners(i);
+            let kept = !Triangle::is_flat(described) && Triangle::record::<f32>(described.map(local)).is_ok();
             if kept && corners.iter().flatten().all(|x| x.is_finite()) {
                 self.indices.push(triangle.map(|v| base + v));
                 self.ids.push([part.first_prim + i as u32, inst]);

@@ -119,21 +119,28 @@ impl<S: Real> Primitives<S> {
         let Self { sources, boxes, classes, triangles, .. } = self;
         let new = &triangles[first..];
         let source = |i: usize| Source { at: (first + i) as u32, id: part.first_prim + i as u32 };
+        // Corners on a line are dropped where they are described, too: placing and rounding them would make slivers of some.
+        let fault = |i: usize| {
+            let corners = mesh.corners(i);
+            let placed = Triangle::record::<S>(corners.map(place)).err();
+            placed.or(Triangle::is_flat(corners).then_some(Degenerate::ZeroArea))
+        };
         // As a rule all are good, and each has its place in the lists beforehand.
-        let is_good = |corners| Triangle::check(corners).is_ok();
-        let are_good = if new.len() < FEW { new.iter().all(is_good) } else { new.par_iter().all(is_good) };
+        let is_good = |i| fault(i).is_none();
+        let are_good =
+            if new.len() < FEW { (0..new.len()).all(is_good) } else { (0..new.len()).into_par_iter().all(is_good) };
         if are_good {
             extend(sources, 0..new.len(), source);
             extend(boxes, 0..new.len(), |i| Triangle::bounds(&new[i]));
         } else {
             for (i, corners) in new.iter().enumerate() {
-                match Triangle::check(corners) {
-                    Ok(()) => {
+                match fault(i) {
+                    None => {
                         sources.push(source(i));
                         boxes.push(Triangle::bounds(corners));
                     }
-                    Err(Degenerate::NonFinite) => counts.nonfinite += 1,
-                    Err(Degenerate::ZeroArea) => counts.degenerate += 1,
+                    Some(Degenerate::NonFinite) => counts.nonfinite += 1,
+                    Some(Degenerate::ZeroArea) => counts.degenerate += 1,
                 }
             }
         }

@@ -177,6 +177,10 @@ fn degenerate_triangles_are_told_apart() {
     assert_eq!((single(beyond), double(beyond)), (infinite, None));
     let close = [p(1.0, 0.0, 0.0), p(1.0 + 1e-12, 0.0, 0.0), p(1.0, 1.0, 0.0)];
     assert_eq!((single(close), double(close)), (zero, None));
+    // On a line as they are, but not after rounding to f32.
+    let line = [p(1.44, -2.75, 2.49), p(1.9, -3.71, 2.13), p(1.67, -3.23, 2.31)];
+    both(line, zero);
+    assert_eq!(Triangle::check(&Triangle::rounded::<f32>(line)), Ok(()));
 }
 
 fn near(got: Option<[f64; 3]>, want: [f64; 3], relative: f64) {
