@@ -267,6 +267,11 @@ fn hits_are_judged_by_the_oracle() {
     let unasked = run(&dir, "compare a.npy wrong.npy", 0).out;
     assert!(unasked.contains("1 beyond rounding") && unasked.contains("ray 1: "), "{unasked}");
     run(&dir, "compare a.npy wrong.npy --max-beyond 0", 1);
+    // Two rays against three.
+    std::fs::write(at.join("few.npy"), ray_file(&[ray(0.7, 0.2), ray(0.2, 0.7)])).expect("rays");
+    run(&dir, "trace square.ply --rays few.npy --engine scalar --hits short.npy --repeat 1", 0);
+    let short = run(&dir, "compare a.npy short.npy --json", 1).json();
+    assert_eq!((short["pass"].as_bool(), &short["answers"]), (Some(false), &serde_json::json!([3, 2])), "{short}");
     refused(at, &["compare", "a.npy", "rays.npy"], "hits");
     refused(at, &["compare", "a.npy", "b.npy", "-o", "d.exr"], "no pixels");
     refused(at, &["compare", "a.npy", "b.npy", "--max-rmse", "1"], "--max-beyond");

@@ -227,6 +227,10 @@ impl Limits {
             return Err(Error::Usage("hits have the limits --max-beyond and --max-different only".into()));
         }
         let mut check = Check::default();
+        let [a, b] = report.answers;
+        if a != b {
+            check.failures.push(format!("the files answer {a} and {b} rays"));
+        }
         let classes = report.classes;
         check.most("rays beyond", self.max_beyond.map(|n| n as f64), Some(classes.beyond as f64));
         let different = classes.beyond + classes.within_one;

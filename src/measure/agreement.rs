@@ -102,7 +102,9 @@ impl Agreement {
         let (hit, t) = ([a.is_hit(i), b.is_hit(i)], [a.t[i].to_f64(), b.t[i].to_f64()]);
         let apart = (t[0] - t[1]).abs();
         let near = apart <= TOLERANCE * t[0].abs().max(t[1].abs()) || hit == [true; 2] && apart <= slack();
-        let same = hit == [false; 2] || hit == [true; 2] && near;
+        // What is no number is near nothing, but it is what it is.
+        let equal = t[0].to_bits() == t[1].to_bits() && (a.prim[i], a.inst[i]) == (b.prim[i], b.inst[i]);
+        let same = equal || hit == [false; 2] || hit == [true; 2] && near;
         if same && (a.prim[i], a.inst[i]) != (b.prim[i], b.inst[i]) {
             self.ties += 1;
             self.unlike.push(self.rays);
@@ -152,6 +154,17 @@ mod tests {
         assert!(agreement.first.as_ref().is_some_and(|text| text.contains("ray 2: t 1 prim 1")), "{agreement:?}");
         assert!(!agreement.passes());
         assert_eq!((agreement.unlike, agreement.differing), (vec![1, 2, 4], vec![2, 4]));
+    }
+
+    #[test]
+    fn equal_bits_are_the_same_even_of_no_number() {
+        let mut bad = Hits::new(2);
+        for (i, t) in [f32::NAN, 1.0].into_iter().enumerate() {
+            (bad.t[i], bad.prim[i], bad.inst[i]) = (t, 3, 0);
+        }
+        let bad = Answers::Closest(vec![bad]);
+        assert_eq!(compare(&bad, &bad).differences(), 0);
+        assert_eq!(compare(&bad, &hits(&[(1.0, 3), (1.0, 3)])).differing, [0]);
     }
 
     #[test]

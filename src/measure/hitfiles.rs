@@ -22,6 +22,8 @@ pub struct HitReport {
     pub query: &'static str,
     /// Rays in the longer file.
     pub rays: u64,
+    /// Rays in either file: what only one answers is beyond, and different.
+    pub answers: [u64; 2],
     /// Rays by the largest distance of t, u and v in units in the last place; another primitive or instance is beyond.
     pub classes: Classes,
     /// Rays with the same t (up to [`agreement::TOLERANCE`]) on another primitive.
@@ -75,8 +77,10 @@ pub fn compare(a: &FileAnswers, b: &FileAnswers) -> Result<HitReport> {
         _ => return Err(Error::Usage("one file answers closest-hit, the other any-hit queries".into())),
     };
     let agreement = agreement::compare(a, b);
+    let answers = [a.ray_count(), b.ray_count()];
     let (rays, ties, differences) = (agreement.rays, agreement.ties, agreement.differences());
-    Ok(HitReport { query, rays, classes, ties, differences, first: agreement.first, judged: None, unlike })
+    let first = agreement.first;
+    Ok(HitReport { query, rays, answers, classes, ties, differences, first, judged: None, unlike })
 }
 
 /// Counts by distance, and the numbers of all rays that are not the same to the bit.
@@ -189,6 +193,7 @@ mod tests {
         assert!(compare(&a, &any).is_err());
         let longer = compare(&any, &Answers::Any(vec![vec![1, 1, 0]])).unwrap();
         assert_eq!((longer.classes.exact, longer.classes.beyond, longer.rays), (1, 2, 3));
+        assert_eq!((report.answers, longer.answers), ([4, 4], [2, 3]));
     }
 
     /// The half-space below z = 0 and rays that fall from z = 1, 2, 3, ...: t is the height.
