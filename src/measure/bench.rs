@@ -67,6 +67,24 @@ pub fn scene<S: Engines>(
     stop: &dyn Fn() -> bool,
     report: &mut dyn FnMut(Row),
 ) -> Result<()> {
+    classes::<S>(workers, description, camera, plan, stop, &mut |_, rows| {
+        rows.into_iter().for_each(&mut *report);
+        Ok(())
+    })
+}
+
+/// The same, where `report` gets all rows of a class before the next is measured.
+///
+/// # Errors
+/// Those of [`scene`] and of `report`, which end it.
+pub fn classes<S: Engines>(
+    workers: &Workers,
+    description: &Description,
+    camera: Framing<'_>,
+    plan: &Plan,
+    stop: &dyn Fn() -> bool,
+    report: &mut dyn FnMut(RayKind, Vec<Row>) -> Result<()>,
+) -> Result<()> {
     let engines = chosen::<S>(&plan.engines)?;
     plan.peers.check()?;
     let world = workers.install(|| World::<S>::compile(description, plan.build))?;
@@ -85,15 +103,16 @@ pub fn scene<S: Engines>(
     let subject =
         Subject { workers, world: &world, oracle: &oracle, facts, pixels: view.pixels, engines, guests, costs };
     for &kind in &plan.kinds {
-        if kind == RayKind::Camera {
+        let rows = if kind == RayKind::Camera {
             let batches = workers.install(|| view.made::<S>());
             let maker = |tile: usize, pencil: &mut Pencil, rays: &mut Rays<S>| view.make(tile, pencil, rays);
             let load = Load { batches: &batches, maker: Some(&maker) };
-            subject.class(kind, load, plan.repeat, stop, report)?;
+            subject.class(kind, load, plan.repeat, stop)?
         } else {
             let rays = workers.install(|| view.rays(&world, kind))?;
-            subject.class(kind, Load::packed(&calls(&rays, workers.threads())), plan.repeat, stop, report)?;
-        }
+            subject.class(kind, Load::packed(&calls(&rays, workers.threads())), plan.repeat, stop)?
+        };
+        report(kind, rows)?;
     }
     Ok(())
 }
@@ -130,14 +149,7 @@ struct Subject<'a, S: 'static> {
 type Admission<S> = std::result::Result<(Answers<S>, Agreement), Box<Outcome>>;
 
 impl<S: Engines> Subject<'_, S> {
-    fn class(
-        &self,
-        kind: RayKind,
-        load: Load<'_, S>,
-        repeat: u32,
-        stop: &dyn Fn() -> bool,
-        report: &mut dyn FnMut(Row),
-    ) -> Result<()> {
+    fn class(&self, kind: RayKind, load: Load<'_, S>, repeat: u32, stop: &dyn Fn() -> bool) -> Result<Vec<Row>> {
         let (query, batches) = (kind.query(), load.batches);
         let slots: u64 = batches.iter().map(|b| b.len() as u64).sum();
         // Tiles go beyond the picture where its sides are no multiples of theirs; what they hold there is no ray of anybody's.
@@ -165,8 +177,7 @@ impl<S: Engines> Subject<'_, S> {
             });
         }
         interleave(self.world, load, &mut series, (WARM_UP, repeat), stop)?;
-        self.rows(kind, batches, rays, entries, &series).into_iter().for_each(report);
-        Ok(())
+        Ok(self.rows(kind, batches, rays, entries, &series))
     }
 
     /// Our engines, the same on fewer threads, then all modes of all peers that are there.
@@ -366,3 +377,6 @@ fn name<S: Engines>(tracer: Tracer<'_, S>) -> &'static str {
 fn mid<S>(series: &Series<'_, S>) -> f64 {
     median(&series.seconds).unwrap_or(f64::INFINITY)
 }
+
+#[cfg(test)]
+mod tests;

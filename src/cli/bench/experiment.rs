@@ -106,10 +106,14 @@ fn cases(
         if left.is_empty() {
             continue;
         }
-        let mut step = |rows: &[Row], class: RayKind| -> Result<()> {
-            let run = Run { command: case.command(class), ..Run::now(case.threads as usize) };
-            let facts = env::facts(case.threads as usize, report.ports);
-            write(&place(report.folder, case, class), &run, rows, &facts)?;
+        // A step begins where the one before ended.
+        let (threads, ports) = (case.threads as usize, report.ports);
+        let begins = || (Run::now(threads), env::facts(threads, ports));
+        let mut at_begin = begins();
+        let mut step = |class: RayKind, rows: Vec<Row>| -> Result<()> {
+            let (run, facts) = std::mem::replace(&mut at_begin, begins());
+            let run = Run { command: case.command(class), ..run };
+            write(&place(report.folder, case, class), &run, &rows, &facts)?;
             report.wrong += rows.iter().filter(|row| matches!(row.outcome, Outcome::Wrong(_))).count();
             report.measured += 1;
             bar.inc(1);
@@ -125,7 +129,7 @@ fn cases(
         };
         let result = open(case, file).and_then(|description| {
             output.warn(description.warnings.iter().filter(|&warning| said.insert(warning.clone())));
-            measure(experiment, case, &description, &left, embree, &mut step)
+            measure(case, &description, &left, embree, &mut step)
         });
         if result.is_err() {
             bar.finish_and_clear();
@@ -166,10 +170,10 @@ fn open(case: &Case, file: &Path) -> Result<Description> {
     load(&scene, &LoadOptions { set: case.set.clone(), ..Default::default() })
 }
 
-type Step<'a> = dyn FnMut(&[Row], RayKind) -> Result<()> + 'a;
+/// Takes all rows of one class of rays.
+type Step<'a> = dyn FnMut(RayKind, Vec<Row>) -> Result<()> + 'a;
 
 fn measure(
-    experiment: &Experiment,
     case: &Case,
     description: &Description,
     kinds: &[RayKind],
@@ -195,46 +199,17 @@ fn measure(
         "" => description.precision == Some(Precision::F64),
         word => word == "f64",
     };
-    let rows = Steps { experiment, pending: Vec::new(), step, failed: None };
     if f64_asked {
-        one::<f64>(&workers, description, &plan, rows)
+        one::<f64>(&workers, description, &plan, step)
     } else {
-        one::<f32>(&workers, description, &plan, rows)
+        one::<f32>(&workers, description, &plan, step)
     }
 }
 
-/// Rows of the class that is being measured; a class is finished when the next begins.
-struct Steps<'a, 's> {
-    experiment: &'a Experiment,
-    pending: Vec<Row>,
-    step: &'a mut Step<'s>,
-    failed: Option<Error>,
-}
-
-impl Steps<'_, '_> {
-    fn add(&mut self, row: Row) {
-        if self.pending.first().is_some_and(|first| first.class != row.class) {
-            self.flush();
-        }
-        self.pending.push(row);
-    }
-
-    fn flush(&mut self) {
-        let rows = std::mem::take(&mut self.pending);
-        let class = rows.first().and_then(|row| self.experiment.rays.iter().find(|kind| kind.name() == row.class));
-        if let (Some(&class), None) = (class, &self.failed) {
-            self.failed = (self.step)(&rows, class).err();
-        }
-    }
-}
-
-fn one<S: Engines>(workers: &Workers, description: &Description, plan: &Plan, mut rows: Steps<'_, '_>) -> Result<()> {
+fn one<S: Engines>(workers: &Workers, description: &Description, plan: &Plan, step: &mut Step<'_>) -> Result<()> {
     let camera = |bounds, size: (u32, u32)| {
         let framed = || framing(bounds, f64::from(size.0) / f64::from(size.1));
         Eye::new(&description.cameras.first().cloned().unwrap_or_else(framed), size)
     };
-    let result = bench::scene::<S>(workers, description, &camera, plan, &stopped, &mut |row| rows.add(row));
-    // All rows of a class are reported at once when it is done, so what is pending is whole.
-    rows.flush();
-    rows.failed.map_or(result, Err)
+    bench::classes::<S>(workers, description, &camera, plan, &stopped, step)
 }
