@@ -231,6 +231,13 @@ fn peers_are_rows_and_a_missing_one_says_so() {
             _ => assert!(peer["lead"].as_f64() > Some(0.0) && peer["quoted"] == true, "{row}"),
         }
     }
+    // Scattered rays begin and end on surfaces: nobody is wrong there for not having our last bit.
+    let line = "bench square.ply --size 64x32 --rays scatter --engines scalar --repeat 3 --peers obvhs --json";
+    let rows = run(&dir, line).json()["rows"].clone();
+    for row in rows.as_array().expect("rows").iter().filter(|row| row["engine"] != "scalar") {
+        assert!(row["outcome"]["skipped"].as_str().is_some_and(|why| why.contains("on surfaces")), "{row}");
+    }
+    assert_eq!(rows.as_array().map(Vec::len), Some(3), "{rows}");
 }
 
 #[test]

@@ -32,6 +32,9 @@ pub const ORACLE_LIMIT: u64 = 20_000_000;
 /// Most rays per class that the oracle judges, whatever they cost.
 pub const ORACLE_RAYS: u64 = 1000;
 
+/// Why peers trace no scattered rays.
+const ON_SURFACES: &str = "scattered rays begin or end on surfaces, where no two arithmetics agree";
+
 /// What to measure.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -55,7 +58,8 @@ pub struct Plan {
 ///
 /// An engine whose answers differ from the `scalar` engine's in one bit gets an [`Outcome::Wrong`] row and no figure (one
 /// with an arithmetic of its own: if the oracle cannot explain a difference); if the oracle rejects the `scalar` engine's answers, so does every engine. Peers may differ as
-/// [`crate::measure::agreement`] says; one that is missing gets an [`Outcome::Skipped`] row per class.
+/// [`crate::measure::agreement`] says; one that is missing gets an [`Outcome::Skipped`] row per class,
+/// all get one for scattered rays.
 ///
 /// # Errors
 /// Unknown engines or peers, those of compiling the world and making the rays; [`Error::Interrupted`] when `stop` says so.
@@ -165,6 +169,8 @@ impl<S: Engines> Subject<'_, S> {
             }
             let admission = match tracer {
                 Tracer::Engine(engine) => self.admit(workers, engine, load, &scalar, rejected.as_deref()),
+                // Whether a segment that begins or ends on a surface meets it there is decided by roundings, each tracer's own.
+                Tracer::Peer(_) if kind == RayKind::Scatter => Err(Box::new(Outcome::Skipped(ON_SURFACES.into()))),
                 Tracer::Peer(peer) => self.admit_peer(peer, batches, &scalar, rays),
             };
             entries.push(Entry {
