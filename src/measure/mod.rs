@@ -3,6 +3,7 @@
 pub mod agreement;
 pub mod answers;
 pub mod bench;
+pub mod command;
 pub mod compare;
 pub mod env;
 pub mod experiment;

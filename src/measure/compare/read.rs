@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::measure::command::{settings, words};
 
 /// Largest file that is read.
 const MAX_BYTES: u64 = 64 << 20;
@@ -11,8 +12,8 @@ const MAX_BYTES: u64 = 64 << 20;
 /// Most runs in a folder.
 const MAX_TURNS: usize = 1000;
 
-/// What a row is about. Shape: scene hash (with the number of the scene among those of one hash, from the second on), class, query,
-/// engine or peer with its mode, precision, threads, rays.
+/// What a row is about. Shape: scene hash (with the number of the scene among those of one hash, from the second on, and with what the
+/// command says of camera, seed and scene: [`settings`]), class, query, engine or peer with its mode, precision, threads, rays.
 pub type Key = [String; 7];
 
 const KEY_COLUMNS: [&str; 8] = ["scene_hash", "class", "query", "engine", "peer_mode", "precision", "threads", "rays"];
@@ -138,7 +139,7 @@ pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Turn> {
         *to = columns.need(name)?;
     }
     let [status, scene, repeat, mrays, mad, ratio] = places;
-    let (date, seconds) = (columns.find("date"), columns.find("seconds"));
+    let [date, seconds, command] = ["date", "seconds", "command"].map(|name| columns.find(name));
     let mut turn = Turn::default();
     let mut scenes = Scenes::default();
     for record in reader.records() {
@@ -174,6 +175,7 @@ pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Turn> {
         };
         let [_, class, query, engine, mode, precision, threads, rays] = keys.map(|i| cell(i).to_string());
         let engine = if mode.is_empty() { engine } else { format!("{engine} [{mode}]") };
+        let numbered = [numbered, settings(&words(command.map_or("", cell)))].join(" ").trim_end().to_string();
         if turn.figures.insert([numbered, class, query, engine, precision, threads, rays], figure).is_some() {
             return Err(Error::at_line(path, line, 1, "a second row about the same rays and engine"));
         }

@@ -191,3 +191,19 @@ fn two_single_runs_show_five_per_cent_and_nothing_where_there_is_nothing() {
     println!("2 runs of 25 rounds: {found} of 100 found, {quiet} of 100 quiet");
     assert!(found >= 95 && quiet >= 95, "{found} found, {quiet} quiet");
 }
+
+/// Rays of other cameras and seeds are other rays, whatever their number.
+#[test]
+fn rows_of_other_rays_are_not_compared() {
+    let of = |command: &str| {
+        let text =
+            format!("{HEADER},command\n{},\"lanecast bench box{command}\"\n", row("tile", 2.0, 0.0, "3").trim_end());
+        [read::parse(Path::new("a.csv"), text.as_bytes()).unwrap()]
+    };
+    let compared = |old: &str, new: &str| Comparison::of(compare(&of(old), &of(new))).map(|c| c.compared).ok();
+    assert_eq!(compared(" --seed 1 -o a", " --threads 1 -o b"), Some(1));
+    assert_eq!(compared(" --eye=1,2,3.0", " --eye 1,2,3"), Some(1));
+    for other in ["", " --eye 1,2,4", " --eye 1,2,3 --seed 2", " --eye 1,2,3 --apart", " --eye 1,2,3 --top part"] {
+        assert_eq!(compared(" --eye 1,2,3", other), None, "{other}");
+    }
+}

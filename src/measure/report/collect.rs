@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::film::picture;
+use crate::measure::command::{settings, values, words};
 use crate::measure::intervals::{Estimate, Interval, median_estimate, paired_ratio};
 
 /// Largest file of rows.
@@ -30,6 +31,12 @@ pub struct Found {
 }
 
 impl Found {
+    /// The rows of one run.
+    pub fn rows_of(&self, run: usize) -> &[Row] {
+        let first = self.rows.partition_point(|row| row.run < run);
+        &self.rows[first..self.rows.partition_point(|row| row.run <= run)]
+    }
+
     /// What the row was measured on, as the end of a title; empty if that is so of all rows.
     pub fn on(&self, row: &Row) -> String {
         if !self.several {
@@ -58,7 +65,7 @@ pub struct Run {
 }
 
 /// One row, by column. Besides the file's columns there are `preset`, `leaf` and `set`: what its command says of them, empty
-/// if it says nothing; and `machine`: which machine it is among those whose CPU has the same name, as far as the folder and the
+/// if it says nothing; `settings`: see [`settings`]; and `machine`: which machine it is among those whose CPU has the same name, as far as the folder and the
 /// file of facts tell.
 #[derive(Debug)]
 pub struct Row {
@@ -195,25 +202,13 @@ fn sitting(folder: &Path, path: &Path, date: &str) -> String {
 
 /// Adds what the command says.
 fn with_options(mut cells: BTreeMap<String, String>) -> BTreeMap<String, String> {
-    let command = cells.get("command").cloned().unwrap_or_default();
+    let words = words(cells.get("command").map_or("", String::as_str));
     for name in ["preset", "leaf"] {
-        cells.insert(name.into(), options(&command, name).last().copied().unwrap_or_default().into());
+        cells.insert(name.into(), values(&words, name).last().copied().unwrap_or_default().into());
     }
-    cells.insert("set".into(), options(&command, "set").join(", "));
+    cells.insert("set".into(), values(&words, "set").join(", "));
+    cells.insert("settings".into(), settings(&words));
     cells
-}
-
-/// The values of `--name` in a command.
-fn options<'a>(command: &'a str, name: &str) -> Vec<&'a str> {
-    let (mut words, mut values) = (command.split_ascii_whitespace(), Vec::new());
-    while let Some(word) = words.next() {
-        match word.strip_prefix("--").and_then(|word| word.strip_prefix(name)) {
-            Some("") => values.extend(words.next()),
-            Some(rest) => values.extend(rest.strip_prefix('=')),
-            None => {}
-        }
-    }
-    values
 }
 
 fn walk(folder: &Path, depth: usize, tables: &mut Vec<PathBuf>, pictures: &mut Vec<PathBuf>) -> Result<()> {
@@ -312,7 +307,7 @@ pub mod samples {
                 text.push_str(&format!(
                     "{revision},{day}T00:00:00Z,A CPU,{isa},{threads},box,{prims:x},{prims},{class},tile,f32,"
                 ));
-                text.push_str(&format!("1000,ok,{rate},{rate},0.0,9,lanecast bench box{command}\n"));
+                text.push_str(&format!("1000,ok,{rate},{rate},0.0,9,\"lanecast bench box{command}\"\n"));
             }
             std::fs::write(folder.join("bench.csv"), text).unwrap();
             if *model != 0 {

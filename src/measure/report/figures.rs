@@ -40,13 +40,13 @@ pub fn figure(title: &str, plot: Option<String>, table: &Markup, rows: &[&Row]) 
     }
 }
 
-/// How the tree and the scene were made, as a part of a title: what the command of `row` says, other than of the column `but`.
+/// How the tree, the scene and the rays were made, as a part of a title: what the command of `row` says, other than of the column `but`.
 pub fn made(row: &Row, but: &str) -> String {
     let said = |column: &str, before: &str| match row.text(column) {
         value if value.is_empty() || column == but => String::new(),
         value => format!("{before}{value}"),
     };
-    said("preset", ", preset ") + &said("leaf", ", leaves of up to ") + &said("set", ", ")
+    said("preset", ", preset ") + &said("leaf", ", leaves of up to ") + &said("set", ", ") + &said("settings", ", ")
 }
 
 /// The commands that made `rows`, each once.

@@ -10,12 +10,25 @@ use super::plot::{Line, Places, lines};
 use crate::measure::intervals::{Estimate, Interval};
 
 /// What must be the same for two rows to be about the same thing.
-const SAME: [&str; 12] =
-    ["scene", "scene_hash", "class", "precision", "threads", "rays", "preset", "leaf", "set", "cpu", "isa", "machine"];
+const SAME: [&str; 13] = [
+    "scene",
+    "scene_hash",
+    "class",
+    "precision",
+    "threads",
+    "rays",
+    "preset",
+    "leaf",
+    "set",
+    "settings",
+    "cpu",
+    "isa",
+    "machine",
+];
 
 /// Figures over revisions, where there are at least two.
 pub fn section(found: &Found) -> Option<Section> {
-    let mut groups: BTreeMap<[String; 12], Vec<&Row>> = BTreeMap::new();
+    let mut groups: BTreeMap<[String; 13], Vec<&Row>> = BTreeMap::new();
     for row in found.rows.iter().filter(|row| row.is_timed() && row.is_quoted()) {
         groups.entry(row.key(SAME)).or_default().push(row);
     }
@@ -27,7 +40,7 @@ pub fn section(found: &Found) -> Option<Section> {
     Section::of_figures("history", "History", about, figures)
 }
 
-fn one(found: &Found, key: &[String; 12], rows: &[&Row]) -> Markup {
+fn one(found: &Found, key: &[String; 13], rows: &[&Row]) -> Markup {
     let mut runs: Vec<usize> = rows.iter().map(|row| row.run).collect();
     runs.dedup();
     let name = |run: &usize| {
@@ -109,6 +122,9 @@ mod tests {
             Sample { command: " --preset fast", ..NEW },
             Sample { command: " --leaf 4", ..NEW },
             Sample { command: " --set size=3", ..NEW },
+            Sample { command: " --eye 1,2,3", ..NEW },
+            Sample { command: " --seed 2", ..NEW },
+            Sample { command: " --apart", ..NEW },
         ];
         for other in others {
             let what = format!("{} {}", other.isa, other.command);

@@ -117,8 +117,25 @@ impl Wanted {
         })
     }
 
-    /// Of `scene` and `class`, the newest run that has them all with figures.
-    fn cell<'a>(&self, found: &'a Found, scene: &str, class: &str) -> Option<Cell<'a>> {
+    /// Of `scene` and `classes`, for each the newest run that has them all with figures; of all runs those that have the settings (the
+    /// camera) of the newest: a line below the other must not be of another picture.
+    fn cells<'a>(&self, found: &'a Found, scene: &str, classes: &[&str]) -> Vec<Option<Cell<'a>>> {
+        let runs = || (0..found.runs.len()).rev();
+        let newest = runs().find_map(|run| classes.iter().find_map(|class| self.cell(found, run, scene, class, None)));
+        let settings = newest.map(|cell| cell.engines[0].text("settings"));
+        let cell = |class: &&str| runs().find_map(|run| self.cell(found, run, scene, class, settings));
+        classes.iter().map(cell).collect()
+    }
+
+    /// Of `scene` and `class`, what `run` has, if it has them all with figures and has these settings, should they matter.
+    fn cell<'a>(
+        &self,
+        found: &'a Found,
+        run: usize,
+        scene: &str,
+        class: &str,
+        settings: Option<&str>,
+    ) -> Option<Cell<'a>> {
         let fits = |row: &&Row| {
             row.is_timed()
                 && row.is_quoted()
@@ -128,15 +145,14 @@ impl Wanted {
                 && self.isa.as_deref().is_none_or(|isa| row.text("isa") == isa)
                 && ["", "balanced"].contains(&row.text("preset"))
                 && ["", "8"].contains(&row.text("leaf"))
+                && !row.text("settings").ends_with("--apart")
+                && settings.is_none_or(|settings| row.text("settings") == settings)
         };
-        let of = |run: usize, name: &str| {
-            found.rows.iter().filter(fits).find(|row| row.run == run && row.text("engine") == name)
-        };
-        (0..found.runs.len()).rev().find_map(|run| {
-            let engines = self.engines.iter().map(|engine| of(run, &engine.name)).collect::<Option<Vec<_>>>()?;
-            let peer = self.peer.as_ref().map(|peer| of(run, &peer.name).ok_or(())).transpose().ok()?;
-            Some(Cell { engines, peer })
-        })
+        let rows = found.rows_of(run);
+        let of = |name: &str| rows.iter().filter(fits).find(|row| row.text("engine") == name);
+        let engines = self.engines.iter().map(|engine| of(&engine.name)).collect::<Option<Vec<_>>>()?;
+        let peer = self.peer.as_ref().map(|peer| of(&peer.name).ok_or(())).transpose().ok()?;
+        Some(Cell { engines, peer })
     }
 
     /// What stands between the marks, with empty lines around.
@@ -148,12 +164,13 @@ impl Wanted {
                 classes.push(row.text("class"));
             }
         }
-        let lines = classes.iter().map(|class| {
-            (*class, self.scenes.iter().map(|scene| self.cell(found, &scene.name, class)).collect::<Vec<_>>())
-        });
+        let mut lines: Vec<(&str, Vec<Option<Cell>>)> = classes.iter().map(|class| (*class, Vec::new())).collect();
+        for scene in &self.scenes {
+            let cells = self.cells(found, &scene.name, &classes);
+            lines.iter_mut().zip(cells).for_each(|((_, line), cell)| line.push(cell));
+        }
         // Classes that some scene has.
-        let lines: Vec<(&str, Vec<Option<Cell>>)> =
-            lines.filter(|(_, cells)| cells.iter().any(Option::is_some)).collect();
+        lines.retain(|(_, cells)| cells.iter().any(Option::is_some));
         for (i, scene) in self.scenes.iter().enumerate() {
             if lines.iter().all(|(_, cells)| cells[i].is_none()) {
                 return Err(format!(
@@ -317,6 +334,22 @@ fn wrapped(text: &str) -> String {
 mod tests {
     use super::super::collect::samples::{SAMPLE, Sample, found};
     use super::*;
+
+    #[test]
+    fn a_table_is_of_one_camera_and_of_joined_meshes() {
+        let text = "<!-- figures\nscenes: box\nengines: tile\n-->\n<!-- end of figures -->\n";
+        let (eye, other) = (" --eye 1,2,3", Sample { command: " --eye 3,2,1", rate: 20.0, ..SAMPLE });
+        let made = |files: &[(&str, u32, &[Sample])]| fill(text, Path::new("README.md"), &found(files)).unwrap().0;
+        // The newest has one class only; the other class is of a run that has its camera.
+        let of = |class, rate, day| Sample { command: eye, class, rate, day, ..SAMPLE };
+        let table = made(&[
+            ("a", 0, &[of("ao", 30.0, "2026-01-01")]),
+            ("b", 0, &[Sample { class: "ao", day: "2026-01-02", ..other }]),
+            ("c", 0, &[of("primary", 40.0, "2026-01-03")]),
+            ("d", 0, &[Sample { command: " --eye 1,2,3 --apart", ..of("primary", 50.0, "2026-01-04") }]),
+        ]);
+        assert!(table.contains("| ao | 30.0 |") && table.contains("| primary | 40.0 |"), "{table}");
+    }
 
     #[test]
     fn machines_whose_cpus_have_one_name_are_told_apart() {

@@ -10,12 +10,24 @@ use super::plot::{Bar, bars};
 use crate::measure::intervals::{Estimate, Interval};
 
 /// What distinguishes one figure from another.
-const FIGURE: [&str; 11] =
-    ["scene", "precision", "threads", "rays", "preset", "leaf", "set", "cpu", "isa", "machine", "scene_hash"];
+const FIGURE: [&str; 12] = [
+    "scene",
+    "precision",
+    "threads",
+    "rays",
+    "preset",
+    "leaf",
+    "set",
+    "settings",
+    "cpu",
+    "isa",
+    "machine",
+    "scene_hash",
+];
 
 /// Rows of each figure: of every scene, setting and machine, and every ray class, those of the newest run, in written order.
 fn newest(found: &Found) -> Vec<(String, Vec<&Row>)> {
-    let mut groups: BTreeMap<[String; 11], Vec<&Row>> = BTreeMap::new();
+    let mut groups: BTreeMap<[String; 12], Vec<&Row>> = BTreeMap::new();
     for row in &found.rows {
         groups.entry(row.key(FIGURE)).or_default().push(row);
     }

@@ -10,7 +10,7 @@ use super::plot::{Line, Places, lines};
 use crate::measure::intervals::Estimate;
 
 /// What stays the same within any figure.
-const SAME: [&str; 7] = ["scene", "class", "precision", "preset", "cpu", "isa", "machine"];
+const SAME: [&str; 8] = ["scene", "class", "precision", "preset", "settings", "cpu", "isa", "machine"];
 
 /// A way a scene can grow.
 struct Axis {
@@ -193,6 +193,8 @@ mod tests {
             Sample { command: " --preset fast", ..TWO },
             Sample { command: " --leaf 4", ..TWO },
             Sample { command: " --set size=3", ..TWO },
+            Sample { command: " --fov 30", ..TWO },
+            Sample { command: " --top part", ..TWO },
         ];
         for other in others {
             let what = format!("{} {} {} {}", other.isa, other.revision, other.day, other.command);
