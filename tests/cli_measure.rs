@@ -548,6 +548,15 @@ fn experiments_resume_where_they_were() {
         "{}",
         again.err
     );
+    // From another folder: the commands of the rows name the scene as it is found from here.
+    std::fs::create_dir(at("sub dir")).expect("a folder");
+    std::fs::write(at("sub dir/near.ply"), SQUARE).expect("a scene");
+    let near = "experiment \"near\" {\n scenes near.ply\n engines scalar\n size \"8x8\"\n repeat 3\n}";
+    std::fs::write(at("sub dir/near.kdl"), near).expect("a file");
+    let ended = lanecast(dir.path(), &["bench", "--experiment", "sub dir/near.kdl", "-o", "near"]);
+    assert_eq!(ended.code, Some(0), "{}", ended.err);
+    let rows = std::fs::read_to_string(at("near/near-8x8-t1-balanced/primary/bench.csv")).expect("rows");
+    assert!(rows.contains("lanecast bench 'sub dir/near.ply' --rays primary --engines scalar --size 8x8"), "{rows}");
     let report = run(&dir, "bench --experiment tiny.kdl -o out --json").json();
     let numbers = ["steps", "finished", "measured", "wrong"].map(|key| report[key].as_u64().expect("a number"));
     assert_eq!((numbers, report["experiment"].as_str()), ([4, 4, 0, 0], Some("tiny")), "{report}");

@@ -69,7 +69,7 @@ pub fn command_line() -> String {
 }
 
 /// The words of a command line, quoted where a shell needs it; the first without its folder.
-fn quoted(words: impl Iterator<Item = OsString>) -> String {
+pub fn quoted(words: impl Iterator<Item = OsString>) -> String {
     let words = words.enumerate().map(|(k, word)| {
         let name = Path::new(&word).file_name().filter(|_| k == 0).unwrap_or(&word);
         let word = name.to_string_lossy();

@@ -4,9 +4,11 @@
 //! file; what a case means is spelt out as a command that repeats it alone.
 
 use std::collections::HashSet;
+use std::ffi::OsString;
 use std::path::Path;
 
 use crate::error::Result;
+use crate::measure::env::quoted;
 use crate::measure::raysets::RayKind;
 use crate::scene::kdl::source::{Source, Span, near, quote};
 use crate::scene::kdl::syntax::{self, Entry, Node, Value};
@@ -79,18 +81,35 @@ pub struct Case {
 impl Case {
     /// The command that measures rays of `class` in this case alone.
     pub fn command(&self, class: RayKind) -> String {
-        let mut words = vec!["lanecast bench".to_string(), self.scene.clone()];
-        words.extend(self.set.iter().map(|(name, value)| format!("--set {name}={value}")));
-        words.push(format!("--rays {}", class.name()));
-        let list = |name: &str, values: &[String]| format!("--{name} {}", values.join(","));
-        words.extend((!self.engines.is_empty()).then(|| list("engines", &self.engines)));
-        words.extend((!self.peers.is_empty()).then(|| list("peers", &self.peers)));
+        self.command_on(&self.scene, class, None)
+    }
+
+    /// The same where the scene was found as `scene`, and Embree's library is `embree`.
+    pub fn command_on(&self, scene: &str, class: RayKind, embree: Option<&Path>) -> String {
+        let mut words: Vec<OsString> = ["lanecast", "bench", scene].map(OsString::from).into();
+        let mut say = |name: &str, value: OsString| words.extend([format!("--{name}").into(), value]);
+        self.set.iter().for_each(|(name, value)| say("set", format!("{name}={value}").into()));
+        say("rays", class.name().into());
+        for (name, list) in [("engines", &self.engines), ("peers", &self.peers)] {
+            if !list.is_empty() {
+                say(name, list.join(",").into());
+            }
+        }
+        // Without such a peer the library would be refused.
+        if let Some(library) = embree.filter(|_| self.peers.iter().any(|peer| peer.starts_with("embree"))) {
+            say("embree", library.into());
+        }
         let (width, height) = self.size;
-        words.push(format!("--size {width}x{height} --threads {} --repeat {}", self.threads, self.repeat));
-        words.push(format!("--seed {} --preset {}", self.seed, self.preset));
-        words.extend(self.leaf.map(|leaf| format!("--leaf {leaf}")));
-        words.extend((!self.precision.is_empty()).then(|| format!("--precision {}", self.precision)));
-        words.join(" ")
+        say("size", format!("{width}x{height}").into());
+        say("threads", self.threads.to_string().into());
+        say("repeat", self.repeat.to_string().into());
+        say("seed", self.seed.to_string().into());
+        say("preset", self.preset.as_str().into());
+        self.leaf.iter().for_each(|leaf| say("leaf", leaf.to_string().into()));
+        if !self.precision.is_empty() {
+            say("precision", self.precision.as_str().into());
+        }
+        quoted(words.into_iter())
     }
 
     /// What it is among the others, for people and for a folder's name: scene, parameters and settings.

@@ -106,13 +106,14 @@ fn cases(
         if left.is_empty() {
             continue;
         }
+        let scene = scene_of(case, file);
         // A step begins where the one before ended.
         let (threads, ports) = (case.threads as usize, report.ports);
         let begins = || (Run::now(threads), env::facts(threads, ports));
         let mut at_begin = begins();
         let mut step = |class: RayKind, rows: Vec<Row>| -> Result<()> {
             let (run, facts) = std::mem::replace(&mut at_begin, begins());
-            let run = Run { command: case.command(class), ..run };
+            let run = Run { command: case.command_on(&scene, class, embree), ..run };
             write(&place(report.folder, case, class), &run, &rows, &facts)?;
             report.wrong += rows.iter().filter(|row| matches!(row.outcome, Outcome::Wrong(_))).count();
             report.measured += 1;
@@ -127,10 +128,11 @@ fn cases(
             }
             Ok(())
         };
-        let result = open(case, file).and_then(|description| {
-            output.warn(description.warnings.iter().filter(|&warning| said.insert(warning.clone())));
-            measure(case, &description, &left, embree, &mut step)
-        });
+        let result =
+            load(&scene, &LoadOptions { set: case.set.clone(), ..Default::default() }).and_then(|description| {
+                output.warn(description.warnings.iter().filter(|&warning| said.insert(warning.clone())));
+                measure(case, &description, &left, embree, &mut step)
+            });
         if result.is_err() {
             bar.finish_and_clear();
             return result;
@@ -163,11 +165,10 @@ fn claim(folder: &Path, text: &[u8]) -> Result<()> {
     }
 }
 
-/// The scene of a case in the experiment `file`.
-fn open(case: &Case, file: &Path) -> Result<Description> {
+/// Where the scene of a case in the experiment `file` is.
+fn scene_of(case: &Case, file: &Path) -> String {
     let beside = file.parent().unwrap_or(Path::new("")).join(&case.scene);
-    let scene = if beside.is_file() { beside.to_string_lossy().into_owned() } else { case.scene.clone() };
-    load(&scene, &LoadOptions { set: case.set.clone(), ..Default::default() })
+    if beside.is_file() { beside.to_string_lossy().into_owned() } else { case.scene.clone() }
 }
 
 /// Takes all rows of one class of rays.

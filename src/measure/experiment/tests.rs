@@ -33,6 +33,15 @@ fn cases_are_the_product() {
         "lanecast bench builtin:terrain --set size=10 --set seed=1 --rays diffuse --engines scalar,tile --peers obvhs \
          --size 64x32 --threads 1 --repeat 3 --seed 1 --preset fast --leaf 2 --precision f32"
     );
+    // With all that another shell, in another folder, needs.
+    let spaced = Case {
+        peers: vec!["obvhs".into(), "embree".into()],
+        ..e.cases.iter().find(|c| c.scene.contains(' ')).unwrap().clone()
+    };
+    let said = spaced.command_on("e/meshes/a b.ply", RayKind::Ao, Some(Path::new("lib/embree 4.so")));
+    assert!(said.starts_with("lanecast bench 'e/meshes/a b.ply' --set size=10 "), "{said}");
+    assert!(said.contains(" --peers obvhs,embree --embree 'lib/embree 4.so' --size 64x32 "), "{said}");
+    assert!(!e.cases[0].command_on("x", RayKind::Ao, Some(Path::new("lib.so"))).contains("embree"));
     assert_eq!(e.cases[0].label(), "terrain-size-10-seed-1-64x32-t1-fast-leaf-2-f32");
     let small = parsed("experiment \"x\" { scenes \"builtin:cornell\"; }").unwrap();
     assert_eq!((small.cases.len(), small.rays), (1, vec![RayKind::Primary]));
