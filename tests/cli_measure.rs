@@ -548,6 +548,13 @@ fn experiments_resume_where_they_were() {
         "{}",
         again.err
     );
+    // What is not there is said before anything is measured, or a folder made.
+    let scenes = text.replace("scenes square.ply", "scenes square.ply \"builtin:cornel\"");
+    for (wrong, what) in [(scenes, "`builtin:cornell`"), (text.replace("packet4", "packet5"), "packet5")] {
+        std::fs::write(at("wrong.kdl"), wrong).expect("a file");
+        binary::refused(dir.path(), &["bench", "--experiment", "wrong.kdl", "-o", "wrong", "-q"], what);
+        assert!(!at("wrong").exists(), "{what}");
+    }
     // From another folder: the commands of the rows name the scene as it is found from here.
     std::fs::create_dir(at("sub dir")).expect("a folder");
     std::fs::write(at("sub dir/near.ply"), SQUARE).expect("a scene");

@@ -9,9 +9,11 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::measure::env::quoted;
+use crate::measure::peers::Invitation;
 use crate::measure::raysets::RayKind;
 use crate::scene::kdl::source::{Source, Span, near, quote};
 use crate::scene::kdl::syntax::{self, Entry, Node, Value};
+use crate::trace::engine;
 
 /// Most cases.
 pub const MAX_CASES: usize = 1000;
@@ -175,13 +177,12 @@ impl Reader<'_, '_> {
         let rays = self.each("rays", "primary", |text| text.parse::<RayKind>().map_err(|e| e.to_string()))?;
         // Each class is one step in one folder.
         let rays = RayKind::each_once(&rays);
-        let (engines, peers) = (self.texts("engines")?, self.texts("peers")?);
         let number =
             |text: &str| text.parse::<u32>().ok().filter(|&n| n > 0).ok_or("expected a whole number above 0".into());
         let sizes = self.each("size", "512x288", size)?;
         let threads = self.each("threads", "1", number)?;
-        let repeat = self.each("repeat", "10", number)?[0];
-        let seed = self.each("seed", "1", |text| text.parse().map_err(|_| "expected a whole number".to_string()))?[0];
+        let repeat = self.one("repeat", "10", number)?;
+        let seed = self.one("seed", "1", |text| text.parse().map_err(|_| "expected a whole number".to_string()))?;
         let presets = self.each("preset", "balanced", |text| one_of(text, &["fast", "balanced", "best"]))?;
         let leaves = if self.find("leaf").is_none() { vec![None] } else { self.each("leaf", "8", leaf)? };
         let precisions = if self.find("precision").is_none() {
@@ -189,6 +190,9 @@ impl Reader<'_, '_> {
         } else {
             self.each("precision", "f32", |text| one_of(text, &["f32", "f64"]))?
         };
+        // Whoever is misspelt must not be missed after hours of the others.
+        let engines = self.names("engines", |name| precisions.iter().try_for_each(|p| known_engine(name, p)))?;
+        let peers = self.names("peers", |name| Invitation { names: vec![name.into()], embree: None }.check())?;
         let variations = self.variations()?;
         let trees: Vec<_> = presets.iter().flat_map(|preset| leaves.iter().map(move |leaf| (preset, *leaf))).collect();
         let lists = [variations.len(), scenes.len(), sizes.len(), threads.len(), trees.len(), precisions.len()];
@@ -240,11 +244,29 @@ impl Reader<'_, '_> {
             if values.is_empty() || all.len() * values.len() > MAX_CASES {
                 return Err(self.source.error(node.span, format!("expected 1 to {MAX_CASES} variations")));
             }
+            if self.statements.iter().take_while(|other| !std::ptr::eq(*other, node)).any(|other| varies(other, name)) {
+                return Err(self.source.error(node.span, format!("`vary {name}` is given twice")));
+            }
             let with =
                 |set: &Vec<(String, String)>, value: &String| [&set[..], &[(name.clone(), value.clone())]].concat();
             all = all.iter().flat_map(|set| values.iter().map(|value| with(set, value)).collect::<Vec<_>>()).collect();
         }
         Ok(all)
+    }
+
+    /// The one value of statement `name`, or `default`.
+    fn one<T>(&self, name: &str, default: &str, read: impl Fn(&str) -> std::result::Result<T, String>) -> Result<T> {
+        if let Some(second) = self.find(name).and_then(|node| node.entries.get(1)) {
+            return Err(self.source.error(second.span, format!("expected one value after `{name}`")));
+        }
+        let mut values = self.each(name, default, read)?;
+        Ok(values.swap_remove(0))
+    }
+
+    /// The names in statement `name`, each accepted by `check`; none if it is not there.
+    fn names(&self, name: &str, check: impl Fn(&str) -> Result<()>) -> Result<Vec<String>> {
+        let read = |text: &str| check(text).map(|()| text.to_string()).map_err(|e| e.to_string());
+        if self.find(name).is_none() { Ok(Vec::new()) } else { self.each(name, "", read) }
     }
 
     fn find(&self, name: &str) -> Option<&Node<'_>> {
@@ -279,9 +301,31 @@ impl Reader<'_, '_> {
     fn word(&self, entry: &Entry<'_>) -> Result<String> {
         match &entry.value {
             Value::Text(text) if !text.is_empty() => Ok(text.to_string()),
-            Value::Number(x) => Ok(x.to_string()),
+            Value::Number(x) => {
+                // Whole numbers as they stand there: a seed has more digits than an f64.
+                let written = self.source.text.get(entry.span.start as usize..entry.span.end as usize);
+                let whole = written.and_then(|text| text.replace('_', "").parse::<u64>().ok());
+                Ok(whole.map_or_else(|| x.to_string(), |n| n.to_string()))
+            }
             _ => Err(self.source.error(entry.span, "expected a word or a number")),
         }
+    }
+}
+
+/// Whether `node` is a `vary` of `parameter`.
+fn varies(node: &Node<'_>, parameter: &str) -> bool {
+    let name = node.entries.first().map(|entry| &entry.value);
+    node.name == "vary" && matches!(name, Some(Value::Text(text)) if text == parameter)
+}
+
+/// # Errors
+/// A usage error for an engine that this precision has not; of a scene whose precision is its own, for one that none has.
+fn known_engine(name: &str, precision: &str) -> Result<()> {
+    let (single, double) = (engine::<f32>(name).map(drop), engine::<f64>(name).map(drop));
+    match precision {
+        "f32" => single,
+        "f64" => double,
+        _ => single.or(double),
     }
 }
 

@@ -49,6 +49,19 @@ pub fn load(scene: &str, options: &LoadOptions) -> Result<Description> {
     load_with(scene, options, &read_mesh)
 }
 
+/// Checks what can be told of `scene` without opening it: that it is there, is a scene by its name, and takes such `options`.
+///
+/// # Errors
+/// As [`load`].
+pub fn check(scene: &str, options: &LoadOptions) -> Result<()> {
+    check_options(scene, &kind(scene)?, options)?;
+    match scene.strip_prefix("builtin:") {
+        Some(name) if builtin::text(name).is_none() => builtin::load(name, &[]).map(drop),
+        Some(_) => Ok(()),
+        None => std::fs::metadata(scene).map(drop).map_err(|e| Error::io(scene, e)),
+    }
+}
+
 /// As [`load`], with meshes read by `read` (see [`read_mesh`]) instead: for who remembers them.
 ///
 /// # Errors

@@ -20,7 +20,7 @@ use crate::measure::raysets::RayKind;
 use crate::measure::rows::{Outcome, Row, Run};
 use crate::measure::timing::Workers;
 use crate::scene::description::{Description, Precision};
-use crate::scene::load::{LoadOptions, load};
+use crate::scene::load::{LoadOptions, check, load};
 use crate::scene::world::{BuildSettings, Preset};
 use crate::trace::Engines;
 
@@ -50,6 +50,7 @@ pub fn run(file: &Path, folder: Option<&Path>, embree: Option<&Path>, output: &O
     let text = std::fs::read(file).map_err(|e| Error::io(file, e))?;
     let experiment = parse(file, &text)?;
     let folder = folder.map_or_else(|| PathBuf::from(format!("experiment-{}", experiment.name)), Path::to_path_buf);
+    experiment.cases.iter().try_for_each(|case| check(&scene_of(case, file), &options(case)))?;
     claim(&folder, &text)?;
     output.say(&format!("{}: {}", experiment.name, experiment.question));
     let ports = Workers::new(1)?.install(Ports::measure);
@@ -128,11 +129,10 @@ fn cases(
             }
             Ok(())
         };
-        let result =
-            load(&scene, &LoadOptions { set: case.set.clone(), ..Default::default() }).and_then(|description| {
-                output.warn(description.warnings.iter().filter(|&warning| said.insert(warning.clone())));
-                measure(case, &description, &left, embree, &mut step)
-            });
+        let result = load(&scene, &options(case)).and_then(|description| {
+            output.warn(description.warnings.iter().filter(|&warning| said.insert(warning.clone())));
+            measure(case, &description, &left, embree, &mut step)
+        });
         if result.is_err() {
             bar.finish_and_clear();
             return result;
@@ -169,6 +169,11 @@ fn claim(folder: &Path, text: &[u8]) -> Result<()> {
 fn scene_of(case: &Case, file: &Path) -> String {
     let beside = file.parent().unwrap_or(Path::new("")).join(&case.scene);
     if beside.is_file() { beside.to_string_lossy().into_owned() } else { case.scene.clone() }
+}
+
+/// How the scene of a case is opened.
+fn options(case: &Case) -> LoadOptions {
+    LoadOptions { set: case.set.clone(), ..Default::default() }
 }
 
 /// Takes all rows of one class of rays.

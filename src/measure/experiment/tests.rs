@@ -49,6 +49,16 @@ fn cases_are_the_product() {
     assert_eq!(twice.rays, [RayKind::Primary, RayKind::Ao]);
 }
 
+/// A seed is a whole number of 64 bits, as `--seed` takes it.
+#[test]
+fn whole_numbers_keep_all_their_digits() {
+    let e =
+        parsed("experiment \"x\" { scenes a; seed 9007199254740993; vary n 9_007_199_254_740_993 1e3 0.5; }").unwrap();
+    assert_eq!(e.cases[0].seed, 9_007_199_254_740_993);
+    let values: Vec<&str> = e.cases.iter().map(|case| case.set[0].1.as_str()).collect();
+    assert_eq!(values, ["9007199254740993", "1000", "0.5"]);
+}
+
 #[test]
 fn faults_say_where_and_what_is_near() {
     let fault = |text: &str| parsed(text).unwrap_err().to_string();
@@ -73,6 +83,12 @@ fn faults_say_where_and_what_is_near() {
         ("experiment \"x\" { scenes \"a/x.ply\" \"b/x.ply\" }", "two cases are called `x-"),
         ("experiment \"x\" { scenes a a }", "two cases are called `a-"),
         ("experiment \"x\" { scenes a\n threads 1 1 }", "two cases are called `a-"),
+        ("experiment \"x\" { scenes a\n repeat 3 7 }", "e.kdl:2:11: expected one value after `repeat`"),
+        ("experiment \"x\" { scenes a\n seed 5 6 }", "e.kdl:2:9: expected one value after `seed`"),
+        ("experiment \"x\" { scenes a\n vary n 1 2\n vary m 1\n vary n 3 }", "e.kdl:4:2: `vary n` is given twice"),
+        ("experiment \"x\" { scenes a\n engines scalar tiel }", "e.kdl:2:17: "),
+        ("experiment \"x\" { scenes a\n engines tile\n precision f32 f64 }", "no engine `tile` in f64"),
+        ("experiment \"x\" { scenes a\n peers embre }", "did you mean `embree`?"),
         ("experiment \"x\" {", "e.kdl:1:"),
     ] {
         assert!(fault(text).contains(want), "{text}: {}", fault(text));
@@ -80,8 +96,7 @@ fn faults_say_where_and_what_is_near() {
     let many = (0..100).map(|i| i.to_string()).collect::<Vec<_>>().join(" ");
     let product = format!("experiment \"x\" {{ scenes a\n vary a {many}\n vary b {many}\n vary c {many} }}");
     assert!(fault(&product).contains("1 to 1000 variations"), "{}", fault(&product));
-    let lists =
-        format!("experiment \"x\" {{ scenes {0}\n threads {0}\n seed {0}\n repeat {0} }}", many.replace('0', "9"));
+    let lists = format!("experiment \"x\" {{ scenes {0}\n threads {0} }}", many.replace('0', "9"));
     assert!(fault(&lists).contains("at most 1000 cases"), "{}", fault(&lists));
 }
 
