@@ -10,6 +10,9 @@ pub struct Counters {
     pub nodes: u64,
     /// Of these, nodes of sixteen boxes instead of eight.
     pub wide_nodes: u64,
+    /// Boxes in the nodes visited: places of a node without a child hold none.
+    #[serde(default)]
+    pub node_boxes: u64,
     /// Tests of one box against all lanes of a packet, after the packet's bounds met it.
     pub boxes: u64,
     /// Tests of a box against one ray, or against the bounds of several: as many per node visit of a packet or tile as a node
@@ -46,6 +49,7 @@ impl std::ops::AddAssign for Counters {
         self.rays += o.rays;
         self.nodes += o.nodes;
         self.wide_nodes += o.wide_nodes;
+        self.node_boxes += o.node_boxes;
         self.boxes += o.boxes;
         self.box_lanes += o.box_lanes;
         self.leaves += o.leaves;

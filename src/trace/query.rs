@@ -113,11 +113,12 @@ impl<'a, V: Lanes, const ANY: bool, const COUNT: bool> Query<'a, V, ANY, COUNT> 
         }
     }
 
-    /// Counts a node visit of `lanes`, whose children are tested all at once.
+    /// Counts a visit of `lanes` to a node of `boxes`, which are tested all at once.
     #[inline(always)]
-    pub fn count_node(&mut self, lanes: u32) {
+    pub fn count_node(&mut self, lanes: u32, boxes: u32) {
         if COUNT {
             self.counters.nodes += 1;
+            self.counters.node_boxes += u64::from(boxes);
             self.counters.box_lanes += WIDTH as u64;
             self.counters.node_lanes_active += u64::from(lanes.count_ones());
             self.counters.node_lanes_total += V::N as u64;

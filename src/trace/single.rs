@@ -65,7 +65,7 @@ fn nearest<S: Real, const ANY: bool, const COUNT: bool>(
     bundle: &Bundle<S>,
     fetch: impl Fn(Child),
 ) -> Option<Child> {
-    query.count_node(1);
+    query.count_node(1, node.used);
     let mut near = [S::ZERO; WIDTH];
     let mut met = bundle.children::<S>(node, &mut near) & ((1 << node.used) - 1);
     if met == 0 {

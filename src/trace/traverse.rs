@@ -144,7 +144,7 @@ fn tree<V, L, const ANY: bool, const COUNT: bool>(
                 break;
             }
             let node = &tree.nodes[child.index as usize];
-            query.count_node(lanes);
+            query.count_node(lanes, node.used);
             (child, lanes) = children(node, packet, query, &bundle, lanes, |child| {
                 Leaves::<V, ANY, COUNT>::fetch(leaves, &tree.nodes, child)
             });

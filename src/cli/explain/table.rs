@@ -90,6 +90,14 @@ fn engine(work: &Work) -> String {
         0.0 => "\n".to_string(),
         share => format!("; {share:.0} % of the boxes of visited nodes met the packet's bounds and were tested\n"),
     });
+    // The mean above is one of packets: those with many visits and few lanes count for as much there as those with one.
+    if *lanes > 1 {
+        let _infallible = writeln!(
+            text,
+            "  of all lanes that were paid for, {:.0} % wanted the node visit and {:.0} % the primitive test",
+            work.node_lanes, work.prim_lanes
+        );
+    }
     if let Some(together) = work.together {
         let _infallible = writeln!(text, "  {:.0} % of the packets stay together down to the leaves", 100.0 * together);
     }

@@ -57,8 +57,13 @@ pub struct Work {
     pub bytes_per_ray: f64,
     /// Of packets with two or more live rays, the share whose rays stay together down to the leaves; `None` for single rays.
     pub together: Option<f64>,
-    /// Of the boxes of visited nodes, the share that met the packet's bounds and was tested (single rays: met the ray).
+    /// Of the boxes of visited nodes, the share that met the packet's bounds and was tested; 0 for engines that test no box against a
+    /// packet, as those of single rays.
     pub boxes_passed: f64,
+    /// Of the lanes paid for in node visits of all packets, the share that was wanted, per cent; 0 without a visit.
+    pub node_lanes: f64,
+    /// The same of primitive tests.
+    pub prim_lanes: f64,
     /// Million rays per second of the fastest passes, one thread, live rays only.
     pub mrays_per_s: f64,
     /// The time its tests would take alone; `None` if there are other primitives than triangles.
@@ -81,9 +86,9 @@ pub struct PerPacket {
     pub leaves: Spread,
     /// Primitive tests.
     pub prims: Spread,
-    /// Share of lanes that wanted a node visit, per cent.
+    /// Share of lanes that wanted a node visit, per cent; packets without a visit are left out.
     pub node_lanes: Spread,
-    /// Share of lanes that wanted a primitive test, per cent.
+    /// Share of lanes that wanted a primitive test, per cent; packets without a test are left out.
     pub prim_lanes: Spread,
     /// Bytes of nodes and leaf blocks that were looked at, again and again if need be.
     pub bytes: Spread,
@@ -127,7 +132,13 @@ pub fn work<S: Engines>(
     let mut total = Counters::default();
     all.iter().for_each(|c| total += **c);
     let spread = |value: &dyn Fn(&Counters) -> f64| Spread::of(all.iter().map(|c| value(c)).collect());
-    let share = |active: u64, lanes: u64| 100.0 * active as f64 / lanes.max(1) as f64;
+    let share = |[active, lanes]: [u64; 2]| 100.0 * active as f64 / lanes.max(1) as f64;
+    let node_lanes = |c: &Counters| [c.node_lanes_active, c.node_lanes_total];
+    let prim_lanes = |c: &Counters| [c.prim_lanes_active, c.prim_lanes_total];
+    // A packet without a test has wasted no lane on one.
+    let shares_of = |lanes: &dyn Fn(&Counters) -> [u64; 2]| {
+        Spread::of(all.iter().map(|c| lanes(c)).filter(|[_, total]| *total > 0).map(share).collect())
+    };
     let leaf_bytes = bytes_of_leaf(world);
     let rays = total.rays.max(1) as f64;
     let bytes = |c: &Counters| bytes_of_nodes::<S>(c) + c.leaves as f64 * leaf_bytes;
@@ -143,8 +154,8 @@ pub fn work<S: Engines>(
             boxes: spread(&|c| c.boxes as f64),
             leaves: spread(&|c| c.leaves as f64),
             prims: spread(&|c| c.prims as f64),
-            node_lanes: spread(&|c| share(c.node_lanes_active, c.node_lanes_total)),
-            prim_lanes: spread(&|c| share(c.prim_lanes_active, c.prim_lanes_total)),
+            node_lanes: shares_of(&node_lanes),
+            prim_lanes: shares_of(&prim_lanes),
             bytes: spread(&bytes),
             divergence: Spread::of(depths.iter().map(|&depth| f64::from(depth)).collect()),
         },
@@ -154,7 +165,9 @@ pub fn work<S: Engines>(
         prims_per_ray: total.prims as f64 / rays,
         bytes_per_ray: bytes(&total) / rays,
         together: (packets_of_many > 0).then(|| 1.0 - depths.len() as f64 / packets_of_many as f64),
-        boxes_passed: total.boxes as f64 / (8 * (total.nodes + total.wide_nodes)).max(1) as f64,
+        boxes_passed: total.boxes as f64 / total.node_boxes.max(1) as f64,
+        node_lanes: share(node_lanes(&total)),
+        prim_lanes: share(prim_lanes(&total)),
         mrays_per_s: if seconds > 0.0 { total.rays as f64 / seconds / 1e6 } else { 0.0 },
         limit: if is_of_triangles(world) { Limit::of(costs, &total, seconds) } else { None },
         shares,
@@ -305,11 +318,30 @@ mod tests {
             // Every node visit tests eight boxes against bounds, every box that is met is tested against all lanes.
             let lanes = if name == "scalar" { 0 } else { work.lanes as u64 * whole.boxes };
             assert_eq!(whole.box_lanes, 8 * whole.nodes + lanes, "{name}");
+            // Places of a node may be empty.
+            let boxes = whole.nodes..=8 * whole.nodes;
+            assert!(boxes.contains(&whole.node_boxes) && whole.boxes <= whole.node_boxes, "{name}: {whole:?}");
+            assert_eq!(work.boxes_passed, whole.boxes as f64 / whole.node_boxes as f64);
+            let share = 100.0 * whole.prim_lanes_active as f64 / whole.prim_lanes_total as f64;
+            assert_eq!(work.prim_lanes, share, "{name}");
             assert_eq!(work.together.is_some(), work.lanes > 1, "single rays have nobody to part from");
             let limit = work.limit.unwrap();
             let tests = whole.box_lanes as f64 + 2.0 * whole.prim_lanes_total as f64;
             assert!((limit.ns_per_ray * whole.rays as f64 - tests).abs() < 1e-9 * tests, "{name}: {limit:?}");
         }
+    }
+
+    /// Packets that meet no leaf have no lanes in primitives: of single rays all lanes that are paid for are wanted.
+    #[test]
+    fn packets_without_a_test_have_no_share_of_lanes() {
+        let (world, batches, _) = cornell();
+        let mut rays = Rays::new(2);
+        rays.set(0, [1e6; 3], [1.0; 3], 0.0, f32::INFINITY);
+        rays.set(1, batches[0].org(0), batches[0].dir(0), 0.0, f32::INFINITY);
+        let scalar = engine::<f32>("scalar").unwrap();
+        let work = work(scalar, &world, &[rays], RayKind::Scatter, (2, 1), &COSTS, &|| false).unwrap();
+        let Spread { mean, p10, .. } = work.per_packet.prim_lanes;
+        assert_eq!((mean, p10, work.prim_lanes, work.packets), (100.0, 100.0, 100.0, 2));
     }
 
     #[test]

@@ -231,6 +231,7 @@ impl<S: Real> Job<'_, S> {
             let node = &tree.nodes[index as usize];
             if COUNT {
                 self.counters.nodes += 1;
+                self.counters.node_boxes += u64::from(node.used);
                 self.counters.box_lanes += WIDTH as u64;
             }
             let mut hit = bundle.children::<V>(node, &mut near) & ((1 << node.used) - 1);

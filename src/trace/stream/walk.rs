@@ -285,6 +285,7 @@ impl<'a, S: Real> Walk<'a, S> {
                 let node = &nodes[child.index as usize];
                 if COUNT {
                     self.counters.nodes += 1;
+                    self.counters.node_boxes += u64::from(node.used);
                     self.counters.wide_nodes += u64::from(W == WIDE);
                     self.counters.box_lanes += W as u64 * u64::from(rays.count_ones());
                     self.counters.node_lanes_active += u64::from(rays.count_ones());

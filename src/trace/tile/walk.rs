@@ -170,6 +170,7 @@ fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
 ) -> bool {
     if COUNT {
         counters.nodes += 1;
+        counters.node_boxes += u64::from(node.used);
         counters.boxes += u64::from(node.used);
         counters.box_lanes += WIDTH as u64;
         counters.wide_nodes += u64::from(WIDTH == WIDE);
