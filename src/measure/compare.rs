@@ -104,7 +104,16 @@ pub fn compare(old: &[Turn], new: &[Turn]) -> Vec<Change> {
     let find = |turns: &'_ [Turn], key: &Key| -> Vec<Figure> {
         turns.iter().filter_map(|turn| turn.figures.get(key)).cloned().collect()
     };
-    keys.into_iter().map(|key| change(key, &find(old, key), &find(new, key), turns)).collect()
+    // A turn that lacks a row on one side (wrong hits have no figure) must not pair the others with their neighbours.
+    let pairs = |key: &Key| -> (Vec<Figure>, Vec<Figure>) {
+        let of_turn = |(old, new): (&Turn, &Turn)| Some((old.figures.get(key)?.clone(), new.figures.get(key)?.clone()));
+        old.iter().zip(new).filter_map(of_turn).unzip()
+    };
+    let one = |key: &Key| match pairs(key) {
+        (old, new) if turns && old.len() >= MIN_TURNS => change(key, &old, &new, true),
+        _ => change(key, &find(old, key), &find(new, key), false),
+    };
+    keys.into_iter().map(one).collect()
 }
 
 /// Whether the runs took turns: as many on either side, and each pair began before the next.

@@ -67,6 +67,24 @@ fn turns_without_passes_compare() {
     assert_eq!((change.verdict, change.factor, change.basis), ("faster", Some(2.0), Some("rates")));
 }
 
+/// The machine becomes twice as fast from turn to turn; the programs are the same. Rows are paired by their turn, whatever lacks one.
+#[test]
+fn turns_that_lack_a_row_pair_no_others() {
+    let turns = |side: u32, lacking: &[u32]| -> Vec<Turn> {
+        let turn = |number: u32| {
+            let (date, seconds) = ((2 * number + side).to_string(), [0.5f64.powi(number as i32); 3]);
+            let engine = if lacking.contains(&number) { "packet4" } else { "tile" };
+            with_passes(&date, &[(engine, &seconds)])
+        };
+        (0..5).map(turn).collect()
+    };
+    let tile = |old: &[u32], new: &[u32]| find(&compare(&turns(0, old), &turns(1, new)), "tile").clone();
+    let whole = tile(&[1], &[3]);
+    assert_eq!((whole.basis, whole.verdict, whole.factor), (Some("turns"), "no difference seen", Some(1.0)));
+    // Two turns that have both are too few to be judged as turns.
+    assert_eq!(tile(&[1, 2], &[3]).basis, Some("rates"));
+}
+
 /// `bench a/m.obj b/m.obj` of two equal files: rows of `m` and `m-2` with one hash.
 #[test]
 fn scenes_of_one_hash_have_each_their_rows() {
