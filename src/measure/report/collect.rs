@@ -17,6 +17,30 @@ const MAX_DEPTH: usize = 12;
 /// Most rows.
 const MAX_ROWS: usize = 200_000;
 
+/// Columns of numbers, where they are not empty; `seconds` holds several.
+const NUMBERS: [&str; 20] = [
+    "threads",
+    "prims",
+    "rays",
+    "hits",
+    "repeat",
+    "best_mrays_per_s",
+    "median_mrays_per_s",
+    "spread",
+    "mad_seconds",
+    "ratio_to_scalar",
+    "node_lane_use",
+    "prim_lane_use",
+    "percent_of_limit",
+    "build_seconds",
+    "bytes",
+    "ties",
+    "differences",
+    "ours_over_peer",
+    "efficiency",
+    "seconds",
+];
+
 /// All that was found.
 #[derive(Debug, Default)]
 pub struct Found {
@@ -253,8 +277,19 @@ fn read(path: &Path) -> Result<Vec<BTreeMap<String, String>>> {
     {
         return Err(Error::at_line(path, 1, 1, format!("expected a column `{missing}`, as `bench -o` writes it")));
     }
-    let row = |record: csv::StringRecord| header.iter().zip(&record).map(|(h, cell)| (h.into(), cell.into())).collect();
-    reader.records().map(|record| record.map(row).map_err(wrong)).collect()
+    let row = |record: std::result::Result<csv::StringRecord, csv::Error>| -> Result<BTreeMap<String, String>> {
+        let record = record.map_err(wrong)?;
+        let line = record.position().map_or(1, csv::Position::line);
+        for (name, cell) in header.iter().zip(&record).filter(|(name, _)| NUMBERS.contains(name)) {
+            // Without it the run would be shown as if there were none.
+            if !cell.split_ascii_whitespace().all(|word| word.parse().is_ok_and(f64::is_finite)) {
+                let what = format!("expected a number in `{name}`, found `{}`", cell.escape_debug());
+                return Err(Error::at_line(path, line, 1, what));
+            }
+        }
+        Ok(header.iter().zip(&record).map(|(h, cell)| (h.into(), cell.into())).collect())
+    };
+    reader.records().map(row).collect()
 }
 
 /// Lines `name: value`; none if there is no such file.

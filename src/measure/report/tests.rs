@@ -153,4 +153,10 @@ fn a_folder_without_results_is_refused() {
     assert!(fault(dir.path()).contains("bench.csv:1:1: expected a column `scene`"));
     std::fs::write(dir.path().join("bench.csv"), "scene,class,engine,status\n1,2\n").unwrap();
     assert!(fault(dir.path()).contains("bench.csv:2:1"));
+    let head = "scene,class,engine,status,rays,seconds";
+    for (cells, what) in [("1e3,0.5 fast", "`seconds`, found `0.5 fast`"), ("many,0.5", "`rays`, found `many`")] {
+        std::fs::write(dir.path().join("bench.csv"), format!("{head}\nbox,ao,tile,ok,{cells}\n")).unwrap();
+        let said = fault(dir.path());
+        assert!(said.contains("bench.csv:2:1: expected a number in ") && said.contains(what), "{said}");
+    }
 }
