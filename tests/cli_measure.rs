@@ -42,6 +42,8 @@ fn verify_covers_every_engine_query_class_and_precision() {
     for class in ["primary", "scatter"] {
         assert!(lines.iter().any(|l| l["class"] == class && l["hits"].as_u64() > Some(0)), "{class}");
     }
+    let once = run(&dir, "verify square.ply --rays 300 --precision f32 --kinds primary,ao,primary").out;
+    assert_eq!(once.lines().count(), 1 + 2 * 2, "each class once: {once}");
     let brief = run(&dir, "verify square.ply --rays 300").out;
     assert_eq!(brief.lines().count(), 1 + 2 * 6 * 2, "a line per precision, class and query: {brief}");
     let full = run(&dir, "verify square.ply --rays 300 -v").out;
@@ -459,6 +461,19 @@ fn history_keeps_rows_and_names_their_revision() {
     let machine = dir.path().join("results").join(&files(&dir.path().join("results"))[0]);
     let revision = files(&machine).remove(0);
     assert_eq!(files(&machine.join(revision)), ["square", "square-2"]);
+}
+
+/// An engine by two names, a class twice.
+#[test]
+fn explain_takes_each_engine_and_class_once() {
+    let words = "explain square.ply --engine auto,tile,scalar --rays ao,primary,ao --size 16x16 --precision f32 --json";
+    let report = run(&square(), words).json();
+    let classes = report["classes"].as_array().expect("classes");
+    assert_eq!(classes.iter().map(|class| class["rays"].clone()).collect::<Vec<_>>(), ["ao", "primary"]);
+    for class in classes {
+        let engines = class["engines"].as_array().expect("engines");
+        assert_eq!(engines.iter().map(|work| work["engine"].clone()).collect::<Vec<_>>(), ["tile", "scalar"]);
+    }
 }
 
 #[test]

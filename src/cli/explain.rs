@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::film::exr::{Compression, ImageInfo};
 use crate::film::{Film, PlaneData, Window, check_folder, exr, heat};
 use crate::lanes::compiled_isa;
+use crate::measure::bench::chosen;
 use crate::measure::env::REVISION;
 use crate::measure::explain::{Costs, Maps, Quality, Work, costs, quality, work};
 use crate::measure::eye::View;
@@ -18,7 +19,7 @@ use crate::measure::raysets::{RayKind, convert};
 use crate::measure::timing::Workers;
 use crate::scene::description::{Description, Precision};
 use crate::scene::world::World;
-use crate::trace::{Engines, engine};
+use crate::trace::Engines;
 
 /// Picture whose rays are counted unless `--size` says otherwise.
 const DEFAULT_SIZE: (u32, u32) = (384, 224);
@@ -101,13 +102,14 @@ pub fn run(args: &ExplainArgs) -> Result<()> {
 
 fn explain<S: Engines>(args: &ExplainArgs, description: &Description) -> Result<()> {
     let names = if args.engine.is_empty() { vec!["scalar".into(), "auto".into()] } else { args.engine.clone() };
-    let engines = names.iter().map(|name| engine::<S>(name)).collect::<Result<Vec<_>>>()?;
+    // Each once, by whatever name, as `bench` does.
+    let (engines, kinds) = (chosen::<S>(&names)?, RayKind::each_once(&args.rays));
     let size = args.camera.size.unwrap_or(DEFAULT_SIZE);
     let workers = Workers::new(args.threads.count())?;
     let world = workers.install(|| World::<S>::compile(description, args.scene.options.build()))?;
     let camera = |bounds, size| args.camera.ready(description, bounds, size);
     let view = workers.install(|| View::new(&world, description, &camera, size, args.seed))?;
-    let bar = args.output.progress_bar((args.rays.len() * engines.len()) as u64, "counting");
+    let bar = args.output.progress_bar((kinds.len() * engines.len()) as u64, "counting");
     let mut report = Report {
         scene: &args.scene.scene,
         precision: S::PRECISION,
@@ -117,7 +119,7 @@ fn explain<S: Engines>(args: &ExplainArgs, description: &Description) -> Result<
         costs: workers.install(costs::<S>),
         classes: Vec::new(),
     };
-    for &kind in &args.rays {
+    for kind in kinds {
         let batches = convert::<S>(&workers.install(|| view.rays(&world, kind))?);
         let mut class = Class { rays: kind.name(), query: kind.query().name(), engines: Vec::new() };
         for &engine in &engines {

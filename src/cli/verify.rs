@@ -98,12 +98,12 @@ fn one<S: Engines>(
     let options = Options {
         rays: args.rays,
         size: args.camera.size,
-        kinds: args.kinds.clone(),
+        kinds: RayKind::each_once(&args.kinds),
         seed: args.seed,
         build: args.scene.options.build(),
     };
     let camera = |bounds, size| args.camera.ready(description, bounds, size);
-    let bar = args.output.progress_bar((2 * args.kinds.len() * S::engines().len()) as u64, "verifying");
+    let bar = args.output.progress_bar((2 * options.kinds.len() * S::engines().len()) as u64, "verifying");
     let mut report = |line: Line| {
         bar.inc(1);
         lines.push(line);

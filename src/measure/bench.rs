@@ -122,7 +122,10 @@ pub fn classes<S: Engines>(
 }
 
 /// The engines called `names`, each once (`auto` is another name of one), or all of precision `S`.
-fn chosen<S: Engines>(names: &[String]) -> Result<Vec<&'static dyn Engine<S>>> {
+///
+/// # Errors
+/// A usage error for an unknown name.
+pub fn chosen<S: Engines>(names: &[String]) -> Result<Vec<&'static dyn Engine<S>>> {
     if names.is_empty() {
         return Ok(S::engines().to_vec());
     }
