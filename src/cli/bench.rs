@@ -48,7 +48,7 @@ has an arithmetic of its own, up to rounding, and the f64 oracle must explain th
 with the oracle; a wrong engine gets no figure and the exit code is 1. Engines take turns (A B C, A B C, ...) so \
 that a disturbance of the machine falls on all alike. The clock covers traversal of packed rays and the writing of \
 hits, nothing else. Peers take their turns in the same run; their hits may differ from ours by rounding, but one ray \
-in 10000 at most may differ for another reason; or one in 1000, if the oracle explains our answer to each of them and \
+in 10000 at most may differ for another reason; or four in 1000, if the oracle explains our answer to each of them and \
 the peer's to all but one in 10000.";
 
 /// Arguments of `lanecast bench`.

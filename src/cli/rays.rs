@@ -27,7 +27,8 @@ Kinds: primary; shadow (to the scene's first point light, or one just above the 
 cosine-distributed ray per hit, 5 % of the scene's diagonal long); reflect (mirror); diffuse (cosine); scatter \
 (aimed at random primitives from all sides, as many as there are pixels, in no order).
 The order is that of 32x32 pixel tiles, Morton order inside. Where a primary ray misses, the others are dead (t_max \
-< t_min).";
+< t_min); so are those that tiles hold beyond the picture where its sides are no multiples of 32, and `trace` counts \
+them as rays.";
 
 /// Arguments of `lanecast rays`.
 #[derive(Debug, clap::Args)]
