@@ -34,6 +34,9 @@ const CALLS_PER_THREAD: usize = 32;
 /// Length of an ambient occlusion ray relative to the diagonal of the scene's bounds.
 pub const AO_REACH: f64 = 0.05;
 
+/// Diagonal of a scene below which steps off a surface shrink with it.
+const SMALL: f64 = 1.0 / 16.0;
+
 /// How far above the eye the default light of shadow rays sits, relative to the diagonal of the scene's bounds.
 pub const LIGHT_RISE: f64 = 0.05;
 
@@ -216,10 +219,10 @@ pub struct Start {
 
 impl Start {
     /// Where rays start that leave the surface on the side of `normal`.
-    fn origin(&self, normal: DVec3) -> [f32; 3] {
+    fn origin(&self, normal: DVec3, setting: &Setting) -> [f32; 3] {
         match self.is_mapped {
-            true => offset_mapped(self.position, normal),
-            false => offset_origin(self.position, normal),
+            true => offset_mapped(self.position, normal, setting.size()),
+            false => offset_in(self.position, normal, setting.size()),
         }
     }
 }
@@ -294,6 +297,14 @@ pub struct Setting {
     pub seed: u64,
 }
 
+impl Setting {
+    /// By how much steps off a surface that are fixed near 0 are smaller than in scenes of usual size: 1 but for small scenes, whose
+    /// rays would step over all of them. (Not for others: rays of theirs that were measured must stay what they are.)
+    fn size(&self) -> f64 {
+        (self.diagonal / SMALL).min(1.0)
+    }
+}
+
 /// The light of shadow rays: the scene's first point light. A scene without one gets a light near the eye:
 /// [`LIGHT_RISE`] diagonals above it, or half way to what is above it where that is nearer, so that the light is
 /// not buried in a ceiling.
@@ -318,7 +329,7 @@ fn secondary(kind: RayKind, at: &Start, setting: &Setting, random: [f64; 2]) -> 
         RayKind::Shadow => {
             // A surface that faces away from the light is left on its far side, as a shader would leave it.
             let normal = if (setting.light - at.position).dot(at.normal) < 0.0 { -at.normal } else { at.normal };
-            let org = at.origin(normal);
+            let org = at.origin(normal, setting);
             let dir = setting.light - DVec3::from_array(org.map(f64::from));
             return finite(org, dir, 1.0);
         }
@@ -326,7 +337,7 @@ fn secondary(kind: RayKind, at: &Start, setting: &Setting, random: [f64; 2]) -> 
         RayKind::Reflect => (reflect(at.dir, at.normal).normalize_or_zero(), f32::INFINITY),
         RayKind::Diffuse | RayKind::Diffuse2 | RayKind::Diffuse3 => (cosine(), f32::INFINITY),
     };
-    finite(at.origin(at.normal), dir, t_max)
+    finite(at.origin(at.normal, setting), dir, t_max)
 }
 
 fn finite(org: [f32; 3], dir: DVec3, t_max: f32) -> Option<([f32; 3], [f32; 3], f32)> {
@@ -339,10 +350,10 @@ fn reflect(dir: DVec3, normal: DVec3) -> DVec3 {
     dir - normal * (2.0 * dir.dot(normal))
 }
 
-/// As [`offset_origin`], by 256 roundings of the largest coordinate along the whole normal.
-fn offset_mapped(position: DVec3, normal: DVec3) -> [f32; 3] {
-    let size = position.abs().max_element().max(1.0 / 32.0);
-    (position + normal * (256.0 * f64::from(f32::EPSILON) * size)).as_vec3().to_array()
+/// As [`offset_in`], by 256 roundings of the largest coordinate along the whole normal.
+fn offset_mapped(position: DVec3, normal: DVec3, size: f64) -> [f32; 3] {
+    let largest = position.abs().max_element().max(size / 32.0);
+    (position + normal * (256.0 * f64::from(f32::EPSILON) * largest)).as_vec3().to_array()
 }
 
 /// The point moved off its surface towards `normal`, far enough that the f32 rounding of a hit cannot put it on the
@@ -351,14 +362,21 @@ fn offset_mapped(position: DVec3, normal: DVec3) -> [f32; 3] {
 /// Source: C. Waechter and N. Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems,
 /// 2019, chapter 6, with its constants: the step is tuned for scenes of about unit size or larger.
 pub fn offset_origin(position: DVec3, normal: DVec3) -> [f32; 3] {
-    const NEAR_ZERO: f32 = 1.0 / 32.0;
+    offset_in(position, normal, 1.0)
+}
+
+/// The same with a step near 0 that is `size` times as large, but no smaller than the roundings of what is far from there.
+fn offset_in(position: DVec3, normal: DVec3, size: f64) -> [f32; 3] {
     const STEP: f32 = 1.0 / 65536.0;
+    const NEAR_ZERO: f32 = 1.0 / 32.0;
     const ULPS: f32 = 256.0;
     let (point, normal) = (position.as_vec3().to_array(), normal.as_vec3().to_array());
+    let largest = point.iter().fold(0.0f32, |most, p| most.max(p.abs()));
+    let step = (STEP * size as f32).max(8.0 * f32::EPSILON * largest).min(STEP);
     std::array::from_fn(|axis| {
         let (p, n) = (point[axis], normal[axis]);
-        if p.abs() < NEAR_ZERO {
-            return p + STEP * n;
+        if p.abs() < NEAR_ZERO / STEP * step {
+            return p + step * n;
         }
         let ulps = (ULPS * n) as i32;
         let outward = if p < 0.0 { -ulps } else { ulps };

@@ -138,9 +138,30 @@ fn origins_leave_along_the_normal_by_a_step_that_grows_with_the_coordinate() {
 fn origins_on_instances_leave_by_the_largest_coordinate() {
     let start = Start { is_mapped: true, ..at([1000.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]) };
     let step = 256.0 * f64::from(f32::EPSILON) * 1000.0;
-    assert_eq!(start.origin(start.normal), [1000.0, step as f32, 0.0]);
+    assert_eq!(start.origin(start.normal, &setting()), [1000.0, step as f32, 0.0]);
     let (org, ..) = secondary(RayKind::Diffuse, &start, &setting(), [0.5; 2]).unwrap();
-    assert_eq!(org, start.origin(start.normal));
+    assert_eq!(org, start.origin(start.normal, &setting()));
+}
+
+/// A scene 8e-6 wide: a step of 1/65536 would leave all of it behind. Others keep theirs to the bit.
+#[test]
+fn origins_in_small_scenes_stay_in_them() {
+    let of = |diagonal: f64| Setting { diagonal, ..setting() };
+    for is_mapped in [false, true] {
+        let start = Start { is_mapped, ..at([2e-6, 0.0, 1e-6], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]) };
+        let [x, y, z] = start.origin(start.normal, &of(8e-6));
+        assert!((x, z) == (2e-6, 1e-6) && y > 1e-12 && y < 1e-3 * 8e-6, "{x} {y} {z}");
+    }
+    for (position, normal) in [([0.0, 0.01, -3.0], [0.6, 0.8, 0.0]), ([1e4, 0.0, 1e-3], [0.0, 0.6, -0.8])] {
+        let start = at(position, normal, [0.0, -1.0, 0.0]);
+        for diagonal in [1.0 / 16.0, 1.0, 1e6, f64::INFINITY] {
+            let (org, want) = (start.origin(start.normal, &of(diagonal)), offset_origin(start.position, start.normal));
+            assert_eq!(org.map(f32::to_bits), want.map(f32::to_bits), "{diagonal}");
+        }
+    }
+    // A floor without bounds under a speck is rounded like what it is, far away.
+    let far = at([30.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]);
+    assert!(far.origin(far.normal, &of(8e-6))[1] > 30.0 * f32::EPSILON);
 }
 
 #[test]
