@@ -82,7 +82,7 @@ fn turns_that_lack_a_row_pair_no_others() {
     let whole = tile(&[1], &[3]);
     assert_eq!((whole.basis, whole.verdict, whole.factor), (Some("turns"), "no difference seen", Some(1.0)));
     // Two turns that have both are too few to be judged as turns.
-    assert_eq!(tile(&[1, 2], &[3]).basis, Some("rates"));
+    assert_eq!(tile(&[1, 2], &[3]).basis, Some("ratios to scalar"));
 }
 
 /// `bench a/m.obj b/m.obj` of two equal files: rows of `m` and `m-2` with one hash.
