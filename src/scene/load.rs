@@ -11,11 +11,11 @@ use super::kdl::meshes::{MeshFile, MeshFiles, add_looks, add_mesh_materials};
 use super::obj::looks::Looks;
 use super::reference::{Found, References};
 use super::unpack::UnpackLimit;
-use super::{brlcad, builtin, gltf, kdl, obj, ply, stl, unmapped, unpack};
+use super::{brlcad, builtin, gltf, kdl, obj, openscad, ply, stl, unmapped, unpack};
 use crate::error::{Error, Result, nearest_name};
 
 /// Extensions that [`load`] reads; files may also be packed (`.ply.gz`, `.glb.zst`).
-pub const EXTENSIONS: [&str; 8] = ["kdl", "obj", "ply", "stl", "gltf", "glb", "asc", "g"];
+pub const EXTENSIONS: [&str; 9] = ["kdl", "obj", "ply", "stl", "gltf", "glb", "asc", "g", "csg"];
 
 /// Kind of our own scene files, which the built-in ones are too.
 const SCENE_FILE: &str = "kdl";
@@ -80,6 +80,7 @@ pub fn load_with(scene: &str, options: &LoadOptions, read: &ReadMesh<'_>) -> Res
         "kdl" => scene_file(path, options, &references, read)?,
         "gltf" | "glb" => gltf_scene(path, options, &references)?,
         "asc" | "g" => database(path, options)?,
+        "csg" => openscad_model(path, &references, read)?,
         _ => mesh_scene(path, &references, read)?,
     };
     description.source = Some(path.to_path_buf());
@@ -116,6 +117,11 @@ fn database(path: &Path, options: &LoadOptions) -> Result<Description> {
     options.brlcad.tops.iter().for_each(|top| digest.update(format!("\0{top}")));
     description.hash = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
     Ok(description)
+}
+
+fn openscad_model(path: &Path, references: &References<'_>, read: &ReadMesh<'_>) -> Result<Description> {
+    let bytes = unpack::read_file_within(path, openscad::LIMIT)?;
+    openscad::parse(path, &stem(path), &bytes, references, &|path| read(path, references))
 }
 
 /// Refuses options that mean nothing to a scene of kind `kind`: whoever gave them meant another one.

@@ -13,6 +13,7 @@ pub mod material;
 pub mod mesh;
 pub mod mtl;
 pub mod obj;
+pub mod openscad;
 pub mod parameter;
 pub mod pictures;
 pub mod ply;

@@ -1,0 +1,89 @@
+//! `offset`: a figure grown or shrunk by a distance.
+//!
+//! Every edge moves along its normal; between moved edges comes an arc, a point or a cut corner, at notches the corner itself. Of
+//! what that goes around the figure is where it does so counter-clockwise (Chen, McMains, "Polygon offsetting by computing
+//! winding numbers", ASME 2005). Where pieces of arcs begin is OpenSCAD's choice: at the normal of the edge before.
+
+use glam::DVec2;
+
+use super::flat::{Contour, Flat};
+use super::fragments::direction;
+use super::work::Work;
+
+/// Most corners of an outline.
+const MAX_POINTS: usize = 1 << 21;
+
+/// How corners are filled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Corner {
+    /// By arcs, of that many pieces in a whole circle.
+    Round(usize),
+    /// By the point where the edges meet.
+    Sharp,
+    /// By a straight cut at the offset's distance from the corner.
+    Cut,
+}
+
+/// The figure grown by `distance`, or shrunk if that is negative.
+///
+/// # Errors
+/// Too much work.
+pub(super) fn offset(figure: &Flat, distance: f64, corner: Corner, work: &mut Work) -> Result<Flat, String> {
+    let contours = figure.contours().map(|contour| moved(contour, distance, corner, work));
+    let contours: Vec<Contour> = contours.collect::<Result<_, _>>()?;
+    Flat::positive(&contours, work)
+}
+
+fn moved(contour: &Contour, distance: f64, corner: Corner, work: &mut Work) -> Result<Contour, String> {
+    let mut points: Vec<DVec2> = contour.iter().map(|&p| DVec2::from(p)).collect();
+    points.dedup();
+    while points.len() > 1 && points.first() == points.last() {
+        points.pop();
+    }
+    let count = points.len();
+    let normal = |i: usize| (points[(i + 1) % count] - points[i]).normalize_or_zero().perp() * -1.0;
+    let mut out = Vec::with_capacity(2 * count);
+    for (i, &p) in points.iter().enumerate() {
+        let (before, after) = (normal((i + count - 1) % count), normal(i));
+        let first = out.len();
+        join(p, before, after, distance, corner, &mut out);
+        work.steps((out.len() - first) as u64)?;
+        if out.len() > MAX_POINTS {
+            return Err(format!("its outline would have more than {MAX_POINTS} corners"));
+        }
+    }
+    Ok(out.into_iter().map(|p: DVec2| p.to_array()).collect())
+}
+
+/// What comes between two moved edges with these normals, which meet at `p`.
+fn join(p: DVec2, before: DVec2, after: DVec2, distance: f64, corner: Corner, out: &mut Vec<DVec2>) {
+    let (sin, cos) = (before.perp_dot(after), before.dot(after));
+    let (from, to) = (p + before * distance, p + after * distance);
+    if sin * distance < 0.0 {
+        out.extend([from, p, to]);
+        return;
+    }
+    // As good as straight on.
+    if sin.abs() < 1e-9 && cos > 0.0 {
+        out.push(from);
+        return;
+    }
+    let turn = sin.atan2(cos);
+    match corner {
+        // Backwards: there is no such point.
+        Corner::Sharp if 1.0 + cos > 1e-12 => out.push(p + (before + after) * (distance / (1.0 + cos))),
+        Corner::Sharp | Corner::Cut => {
+            let reach = (turn * 0.25).tan() * distance;
+            out.extend([from + before.perp() * reach, to - after.perp() * reach]);
+        }
+        Corner::Round(pieces) => {
+            let step = 360.0 / pieces as f64;
+            let count = (turn.abs().to_degrees() / step).round().max(1.0) as usize;
+            for i in 0..count {
+                let by = direction(step * i as f64 * turn.signum());
+                out.push(p + before.rotate(by) * distance);
+            }
+            out.push(to);
+        }
+    }
+}
