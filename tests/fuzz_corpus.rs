@@ -80,6 +80,20 @@ fn g_corpus() {
     }
 }
 
+#[test]
+fn csg_corpus() {
+    use lanecast::scene::solids::flat::FlatTree;
+    const NO_FILES: References = References { folder: None, allow_outside: false, found: None };
+    let read = |path: &Path| Err(lanecast::error::Error::whole(path, "no files here"));
+    let parse = |file: &Path, bytes: &[u8]| {
+        let scene = lanecast::scene::openscad::parse(file, "corpus", bytes, &NO_FILES, &read);
+        scene.is_ok_and(|scene| scene.solids.iter().all(|tree| FlatTree::new(tree).is_ok()))
+    };
+    for (name, accepted) in verdicts("csg", parse).into_iter().filter(|(name, _)| name.contains('.')) {
+        assert_eq!(accepted, !["open.csg", "text.csg"].contains(&name.as_str()), "{name}");
+    }
+}
+
 /// Files of a corpus by whether they were accepted: each file is read by `parse`.
 fn verdicts(folder: &str, parse: impl Fn(&Path, &[u8]) -> bool) -> Vec<(String, bool)> {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(folder);

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use lanecast::scene::reference::References;
-use lanecast::scene::{gltf, mtl, obj, ply, stl};
+use lanecast::scene::{gltf, mtl, obj, openscad, ply, stl};
 
 /// Tells the process to be the measuring one; its value is the file.
 const FILE: &str = "LANECAST_TEST_MEMORY_FILE";
@@ -32,6 +32,11 @@ fn measure(file: &Path) {
         Some("gltf" | "glb") => {
             let references = References { folder: None, allow_outside: false, found: None };
             gltf::parse(file, "memory", &bytes, &references).map(drop)
+        }
+        Some("csg") => {
+            let references = References { folder: None, allow_outside: false, found: None };
+            let no_files = |path: &Path| Err(lanecast::error::Error::whole(path, "no files here"));
+            openscad::parse(file, "memory", &bytes, &references, &no_files).map(drop)
         }
         _ => stl::parse(file, &bytes).map(drop),
     };
@@ -148,6 +153,13 @@ fn dense_files_stay_below_the_stated_bounds() {
         (64, "meshes.gltf", gltf_list(SIZE, "", "meshes", "{}")),
         (64, "names.gltf", gltf_list(SIZE, "", "extensionsUsed", "\"a\"")),
         (64, "strip.glb", strip_glb(SIZE)),
+        (256, "cubes.csg", repeated("", "cube();")),
+        (256, "unions.csg", repeated("", "union(){}")),
+        (
+            256,
+            "lists.csg",
+            repeated("", "cube(a=[[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[],[]]);"),
+        ),
     ] {
         let (_, touched, is_read) = rise(name, &bytes);
         let times = touched as f64 / bytes.len() as f64;

@@ -61,7 +61,8 @@ impl EngineArgs {
 /// A scene and how to open it.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SceneArgs {
-    /// A scene file (.kdl .gltf .glb), a BRL-CAD database (.asc .g), a mesh (.obj .ply .stl) or builtin:NAME
+    /// A scene file (.kdl .gltf .glb), a BRL-CAD database (.asc .g), an OpenSCAD model (.csg), a mesh (.obj .ply .stl) or
+    /// builtin:NAME
     pub scene: String,
     #[command(flatten)]
     /// How to open it.

@@ -46,7 +46,7 @@ Examples:
   lanecast rays model.ply --kind ao -o ao.npy          rays for this and other programs
   lanecast trace model.ply --rays ao.npy --query any   trace a file of rays
 
-A SCENE is a file (.kdl .gltf .glb .asc .g .obj .ply .stl) or builtin:NAME.
+A SCENE is a file (.kdl .gltf .glb .asc .g .csg .obj .ply .stl) or builtin:NAME.
 Exit codes: 0 success, 1 a comparison fails, 2 bad usage or input, 130 Ctrl-C.";
 
 /// Traces rays in SIMD lanes: how fast, how right, and what it looks like

@@ -8,7 +8,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use super::fields::Fields;
 use super::flat::{self, Flat};
 use super::hull::{flat_hull, hull};
-use super::looks::Looks;
+use super::looks::{Looks, Palette};
 use super::minkowski;
 use super::solids::{Solids, Trouble};
 use super::syntax::{Node, Source};
@@ -57,6 +57,7 @@ pub(super) struct Builder<'s, 'a, 'r> {
     pub looks: &'s Looks,
     pub solids: Solids,
     pub work: Work,
+    pub palette: Palette,
     pub loose: Vec<Loose>,
     pub warnings: Vec<String>,
     /// Balls and cylinders by their numbers.
@@ -73,9 +74,9 @@ impl<'s, 'a, 'r> Builder<'s, 'a, 'r> {
         tree: SolidTree,
         read: &'r mut ReadMesh<'r>,
     ) -> Self {
-        let (solids, work) = (Solids::new(tree), Work::new());
+        let (solids, work, palette) = (Solids::new(tree), Work::new(), Palette::default());
         let (loose, warnings, known) = (Vec::new(), Vec::new(), HashMap::new());
-        Self { source, nodes, looks, solids, work, loose, warnings, known, read }
+        Self { source, nodes, looks, solids, work, palette, loose, warnings, known, read }
     }
 
     /// What the file makes.
@@ -289,7 +290,7 @@ impl<'s, 'a, 'r> Builder<'s, 'a, 'r> {
         self.work.triangles(mesh.triangles.len()).map_err(|what| self.error(i, what))?;
         let mesh = Arc::new(mesh);
         self.solids.tree.closed.push(mesh.clone());
-        let solid = self.solids.mesh(self.nodes[i].at, mesh, None, self.looks.materials[i]);
+        let solid = self.solids.mesh(self.nodes[i].at, mesh, None, self.palette.material(self.looks, i));
         Ok(Made::Solid(Some(solid)))
     }
 

@@ -71,6 +71,7 @@ pub(super) fn describe(
     };
     let (mut tree, loose) = (builder.solids.tree, builder.loose);
     description.warnings.append(&mut builder.warnings);
+    description.materials.append(&mut builder.palette.materials);
     description.hash = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
     let mut bounds = None;
     if let Some(root) = root {

@@ -8,7 +8,7 @@ use super::build::{Builder, Loose, Made};
 use super::extrude::{Rise, rise, turn};
 use super::flat::{self, Contour, Flat};
 use super::fragments::{MAX_PIECES, circle};
-use super::offset::{Corner, offset};
+use super::offset::{Corner, arcs, offset};
 use super::primitives;
 use crate::error::{Result, nearest_name};
 use crate::scene::mesh::Mesh;
@@ -92,7 +92,7 @@ impl Builder<'_, '_, '_> {
             return Ok(Made::Solid(None));
         }
         let lo = if is_centred { size * -0.5 } else { DVec3::ZERO };
-        let cube = self.solids.cuboid(self.nodes[i].at, (lo, lo + size), self.looks.materials[i]);
+        let cube = self.solids.cuboid(self.nodes[i].at, (lo, lo + size), self.palette.material(self.looks, i));
         Ok(Made::Solid(Some(cube)))
     }
 
@@ -109,7 +109,7 @@ impl Builder<'_, '_, '_> {
                 mesh
             }
         };
-        Ok(Made::Solid(Some(self.solids.mesh(self.nodes[i].at, mesh, None, self.looks.materials[i]))))
+        Ok(Made::Solid(Some(self.solids.mesh(self.nodes[i].at, mesh, None, self.palette.material(self.looks, i)))))
     }
 
     fn sphere(&mut self, i: usize) -> Result<Made> {
@@ -195,7 +195,7 @@ impl Builder<'_, '_, '_> {
             }
         }
         self.warn(i, &format!("shown as a surface, as it has no inside: {what}"));
-        self.loose.push(Loose { mesh: Arc::new(mesh), transform, material: self.looks.materials[i] });
+        self.loose.push(Loose { mesh: Arc::new(mesh), transform, material: self.palette.material(self.looks, i) });
         Ok(Made::Solid(None))
     }
 
@@ -270,9 +270,12 @@ impl Builder<'_, '_, '_> {
             Some(_) => Corner::Sharp,
             None => {
                 let pieces = fields.resolution()?.circle(distance.abs());
-                Corner::Round(pieces.map_err(|what| self.error(i, what))?)
+                Corner::Round(arcs(distance, pieces.map_err(|what| self.error(i, what))?))
             }
         };
+        if distance == 0.0 {
+            return Ok(Made::Flat(figure.clone()));
+        }
         let moved = offset(figure, distance, corner, &mut self.work).map_err(|what| self.error(i, what))?;
         Ok(Made::Flat(moved))
     }
@@ -315,7 +318,7 @@ impl Builder<'_, '_, '_> {
         let (mesh, prisms) = made.map_err(|what| self.error(i, what))?;
         let mesh = Arc::new(mesh);
         self.solids.tree.closed.push(mesh.clone());
-        Ok(Made::Solid(Some(self.solids.mesh(self.nodes[i].at, mesh, prisms, self.looks.materials[i]))))
+        Ok(Made::Solid(Some(self.solids.mesh(self.nodes[i].at, mesh, prisms, self.palette.material(self.looks, i)))))
     }
 
     fn rotate_extrude(&mut self, i: usize, figure: &Flat) -> Result<Made> {
@@ -331,6 +334,6 @@ impl Builder<'_, '_, '_> {
         let mesh = turn(figure, angle, start, &resolution, &mut self.work).map_err(|what| self.error(i, what))?;
         let mesh = Arc::new(mesh);
         self.solids.tree.closed.push(mesh.clone());
-        Ok(Made::Solid(Some(self.solids.mesh(self.nodes[i].at, mesh, None, self.looks.materials[i]))))
+        Ok(Made::Solid(Some(self.solids.mesh(self.nodes[i].at, mesh, None, self.palette.material(self.looks, i)))))
     }
 }

@@ -23,19 +23,30 @@ pub(super) struct Looks {
     pub parents: Vec<u32>,
     /// Whether a call counts; those in its braces may not.
     pub is_there: Vec<bool>,
-    /// Material of what a call makes; none for the default.
-    pub materials: Vec<Option<MaterialId>>,
+    /// Colour around each, sRGB and alpha, and whether it is cut away.
+    around: Vec<(Option<[f64; 4]>, bool)>,
 }
 
 /// Materials by their colours.
-struct Palette<'d> {
-    description: &'d mut Description,
+#[derive(Default)]
+pub(super) struct Palette {
+    /// In the order they were asked for; those of a scene begin with its default one.
+    pub materials: Vec<Material>,
     known: HashMap<[u64; 4], MaterialId>,
 }
 
-impl Palette<'_> {
-    fn material(&mut self, color: [f64; 4]) -> MaterialId {
-        let Self { description, known } = self;
+impl Palette {
+    /// The material of what the call `i` makes; none for the default.
+    pub fn material(&mut self, looks: &Looks, i: usize) -> Option<MaterialId> {
+        match looks.around[i] {
+            (Some(color), _) => Some(self.of_color(color)),
+            (None, true) => Some(self.of_color([CUT[0], CUT[1], CUT[2], 1.0])),
+            (None, false) => None,
+        }
+    }
+
+    fn of_color(&mut self, color: [f64; 4]) -> MaterialId {
+        let Self { materials, known } = self;
         *known.entry(color.map(f64::to_bits)).or_insert_with(|| {
             let [red, green, blue, opacity] = color;
             let percent = if opacity < 1.0 { format!(" {:.0}%", opacity * 100.0) } else { String::new() };
@@ -43,8 +54,8 @@ impl Palette<'_> {
             let alpha = if opacity < 1.0 { Alpha::Blend } else { Alpha::Opaque };
             let diffuse = linear([red, green, blue]);
             let name = format!("color {name}{percent}");
-            description.materials.push(Material { name, diffuse, opacity, alpha, ..Material::default() });
-            description.materials.len() as MaterialId - 1
+            materials.push(Material { name, diffuse, opacity, alpha, ..Material::default() });
+            materials.len() as MaterialId
         })
     }
 }
@@ -54,7 +65,8 @@ fn linear(color: [f64; 3]) -> DVec3 {
     DVec3::from(color.map(|x| if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }))
 }
 
-/// Looks through all calls, those around others first, and adds their materials and warnings to `description`.
+/// Looks through all calls, those around others first, and adds warnings to `description`, whose default material gets OpenSCAD's
+/// colour.
 ///
 /// # Errors
 /// Colours that are none.
@@ -65,27 +77,20 @@ pub(super) fn looks(source: &Source<'_>, nodes: &[Node<'_>], description: &mut D
         node.children.iter().for_each(|&child| parents[child as usize] = i as u32);
     }
     let root = root(source, nodes, description);
-    let mut looks = Looks { root, parents, is_there: vec![false; nodes.len()], materials: vec![None; nodes.len()] };
+    let (is_there, around) = (vec![false; nodes.len()], vec![(None, false); nodes.len()]);
+    let mut looks = Looks { root, parents, is_there, around };
     looks.is_there[root as usize] = true;
-    let mut palette = Palette { description, known: HashMap::new() };
-    // Of each call: the colour around it, and whether it is cut away.
-    let mut around: Vec<(Option<[f64; 4]>, bool)> = vec![(None, false); nodes.len()];
     let mut backgrounds = 0;
     for i in root as usize..nodes.len() {
         if !looks.is_there[i] {
             continue;
         }
         let node = &nodes[i];
-        let (mut color, is_cut) = around[i];
+        let (mut color, is_cut) = looks.around[i];
         // The outermost colour counts.
         if node.name == "color" && color.is_none() {
             color = color_of(source, node)?;
         }
-        looks.materials[i] = match (color, is_cut) {
-            (Some(color), _) => Some(palette.material(color)),
-            (None, true) => Some(palette.material([CUT[0], CUT[1], CUT[2], 1.0])),
-            (None, false) => None,
-        };
         let mut is_first = true;
         for &child in &node.children {
             let marks = nodes[child as usize].marks;
@@ -94,13 +99,13 @@ pub(super) fn looks(source: &Source<'_>, nodes: &[Node<'_>], description: &mut D
                 continue;
             }
             looks.is_there[child as usize] = true;
-            around[child as usize] = (color, is_cut != (node.name == "difference" && !is_first));
+            looks.around[child as usize] = (color, is_cut != (node.name == "difference" && !is_first));
             is_first = false;
         }
     }
     if backgrounds > 0 {
-        let what = format!("{backgrounds} objects in the background (%) are left out");
-        palette.description.warnings.push(what);
+        let what = format!("objects in the background (`%`) are left out: {backgrounds}");
+        description.warnings.push(what);
     }
     Ok(looks)
 }

@@ -4,7 +4,7 @@
 //! become the operations of one [tree of solids](crate::scene::solids), never of meshes; curves become the faces that OpenSCAD gives
 //! them. Plane figures are worked out by themselves (`flat`) and swept to closed meshes (`extrude`).
 //!
-//! Nothing recurses over what a file says, and what it may cost is counted (`work`). Memory stays below 64 bytes per byte of
+//! Nothing recurses over what a file says, and what it may cost is counted (`work`). Memory stays below 256 bytes per byte of
 //! the file while it is read.
 
 mod build;

@@ -4,6 +4,8 @@
 //! what that goes around the figure is where it does so counter-clockwise (Chen, McMains, "Polygon offsetting by computing
 //! winding numbers", ASME 2005). Where pieces of arcs begin is OpenSCAD's choice: at the normal of the edge before.
 
+use std::f64::consts::{PI, TAU};
+
 use glam::DVec2;
 
 use super::flat::{Contour, Flat};
@@ -16,12 +18,20 @@ const MAX_POINTS: usize = 1 << 21;
 /// How corners are filled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Corner {
-    /// By arcs, of that many pieces in a whole circle.
-    Round(usize),
+    /// By arcs, of that many pieces in a whole circle: see [`arcs`].
+    Round(f64),
     /// By the point where the edges meet.
     Sharp,
     /// By a straight cut at the offset's distance from the corner.
     Cut,
+}
+
+/// Pieces of a whole circle in offsets by `distance`, where a circle of that radius has `pieces`: about as many. The way from one number
+/// to the other, over how far such pieces are from the circle, is OpenSCAD's, as its roundings decide how arcs of half a piece end.
+pub(super) fn arcs(distance: f64, pieces: usize) -> f64 {
+    let off = distance.abs() * (1.0 - direction(180.0 / pieces as f64).x);
+    let share = off.min(distance.abs() * 0.25) / distance.abs();
+    PI / (1.0 - share).acos()
 }
 
 /// The figure grown by `distance`, or shrunk if that is negative.
@@ -71,16 +81,15 @@ fn join(p: DVec2, before: DVec2, after: DVec2, distance: f64, corner: Corner, ou
     let turn = sin.atan2(cos);
     match corner {
         // Backwards: there is no such point.
-        Corner::Sharp if 1.0 + cos > 1e-12 => out.push(p + (before + after) * (distance / (1.0 + cos))),
+        Corner::Sharp if 1.0 + cos > 2e-12 => out.push(p + (before + after) * (distance / (1.0 + cos))),
         Corner::Sharp | Corner::Cut => {
             let reach = (turn * 0.25).tan() * distance;
             out.extend([from + before.perp() * reach, to - after.perp() * reach]);
         }
         Corner::Round(pieces) => {
-            let step = 360.0 / pieces as f64;
-            let count = (turn.abs().to_degrees() / step).round().max(1.0) as usize;
+            let count = (pieces / TAU * turn.abs() + 0.5).floor().max(1.0) as usize;
             for i in 0..count {
-                let by = direction(step * i as f64 * turn.signum());
+                let by = DVec2::from_angle(TAU / pieces * i as f64 * turn.signum());
                 out.push(p + before.rotate(by) * distance);
             }
             out.push(to);

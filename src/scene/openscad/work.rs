@@ -1,7 +1,7 @@
 //! What a file may cost: no file of a few lines may ask for hours or for all memory.
 
 /// Most steps: a pair of edges that is looked at, a point that is seen from a face.
-const MAX_STEPS: u64 = 1 << 31;
+const MAX_STEPS: u64 = 1 << 30;
 /// Most triangles that are made.
 const MAX_TRIANGLES: u64 = 1 << 24;
 
@@ -23,7 +23,7 @@ impl Work {
     /// # Errors
     /// There are not so many left.
     pub fn steps(&mut self, count: u64) -> Result<(), String> {
-        self.steps = self.steps.checked_sub(count).ok_or("the file takes too much work: more than 2^31 steps")?;
+        self.steps = self.steps.checked_sub(count).ok_or("the file takes too much work: more than 2^30 steps")?;
         Ok(())
     }
 

@@ -1,0 +1,1 @@
+cylinder(h=5,r1=3,r2=3); translate([10,0,0]) cylinder(h=5,r1=3,r2=1,$fn=5); translate([20,0,0]) cylinder(h=5,r1=3,r2=0,center=true); translate([0,10,0]) cylinder(h=5,r1=0,r2=3,$fn=6); translate([10,10,0]) cylinder(h=4,d=3,$fn=6,center=true);translate([20,10,0]) cylinder(h=4,r=30,$fa=30);
