@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec2, DVec3};
 use sha2::{Digest, Sha256};
 
-use super::build::{Builder, Made};
+use super::build::{Builder, Loose, Made};
 use super::extrude::{Rise, rise};
 use super::facets;
 use super::fragments::{GRID, Resolution};
@@ -18,8 +18,8 @@ use crate::scene::description::{Description, Item, ItemKind, Precision};
 use crate::scene::kdl::meshes::MeshFile;
 use crate::scene::mesh::Mesh;
 use crate::scene::reference::References;
-use crate::scene::solids::SolidTree;
 use crate::scene::solids::flat::FlatTree;
+use crate::scene::solids::{NodeId, SolidTree};
 
 /// Height of a plane figure that is not extruded, as OpenSCAD shows it.
 const PLATE: f64 = 1.0;
@@ -53,32 +53,39 @@ pub(super) fn describe(
     tree.tolerance = GRID;
     let mut builder = Builder::new(&source, &nodes, &looks, tree, &mut read_mesh);
     let made = builder.all()?;
-    let root = match made {
-        Made::Solid(solid) => solid,
-        Made::Nothing => None,
-        Made::Flat(figure) if figure.is_empty() => None,
-        Made::Flat(figure) => {
-            let what = "the model is a plane figure: shown as a plate of height 1, as OpenSCAD does";
-            builder.warnings.push(what.into());
-            let way = Rise { way: DVec3::Z * PLATE, is_centred: true, twist: 0.0, scale: DVec2::ONE, slices: Some(1) };
-            let plate = rise(&figure, &way, &Resolution::new(0.0, 12.0, 2.0), &mut builder.work);
-            let (mesh, _) = plate.map_err(|what| Error::whole(file, what))?;
-            match builder.solid_of(looks.root as usize, Some(mesh))? {
-                Made::Solid(solid) => solid,
-                _ => None,
-            }
-        }
-    };
-    let (mut tree, loose) = (builder.solids.tree, builder.loose);
+    let root = solid(&mut builder, made, looks.root as usize)?;
     description.warnings.append(&mut builder.warnings);
     description.materials.append(&mut builder.palette.materials);
+    let (tree, loose) = (builder.solids.tree, builder.loose);
     description.hash = digest.finalize().iter().map(|b| format!("{b:02x}")).collect();
+    place(&mut description, root.map(|root| SolidTree { root, ..tree }), loose)
+        .map_err(|what| Error::whole(file, what))?;
+    Ok(description)
+}
+
+/// What the file makes as a solid: figures become plates.
+fn solid(builder: &mut Builder<'_, '_, '_>, made: Made, root: usize) -> Result<Option<NodeId>> {
+    let figure = match made {
+        Made::Solid(solid) => return Ok(solid),
+        Made::Flat(figure) if !figure.is_empty() => figure,
+        _ => return Ok(None),
+    };
+    builder.warnings.push("the model is a plane figure: shown as a plate of height 1, as OpenSCAD does".into());
+    let way = Rise { way: DVec3::Z * PLATE, is_centred: true, twist: 0.0, scale: DVec2::ONE, slices: Some(1) };
+    let plate = rise(&figure, &way, &Resolution::new(0.0, 12.0, 2.0), &mut builder.work);
+    let (mesh, _) = plate.map_err(|what| builder.error(root, what))?;
+    match builder.solid_of(root, Some(mesh))? {
+        Made::Solid(solid) => Ok(solid),
+        _ => Ok(None),
+    }
+}
+
+/// Puts the tree and the meshes into the scene, with a camera that sees them.
+fn place(description: &mut Description, tree: Option<SolidTree>, loose: Vec<Loose>) -> std::result::Result<(), String> {
     let mut bounds = None;
-    if let Some(root) = root {
-        tree.root = root;
+    if let Some(mut tree) = tree {
         facets::simplify(&mut tree);
-        let flat = FlatTree::new(&tree).map_err(|what| Error::whole(file, what))?;
-        bounds = view::bounds(&flat);
+        bounds = view::bounds(&FlatTree::new(&tree)?);
         let item = Item { transform: DAffine3::IDENTITY, material: None, kind: ItemKind::Solids(0) };
         description.solids.push(Arc::new(tree));
         description.groups[0].items.push(item);
@@ -93,5 +100,5 @@ pub(super) fn describe(
         description.groups[0].items.push(Item { transform: part.transform, material: part.material, kind });
     }
     description.cameras.push(view::camera(bounds));
-    Ok(description)
+    Ok(())
 }

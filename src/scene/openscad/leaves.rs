@@ -121,8 +121,13 @@ impl Builder<'_, '_, '_> {
             return Ok(Made::Solid(None));
         }
         let pieces = resolution.circle(radius).map_err(|what| self.error(i, what))?;
-        let numbers = [0.0, radius, pieces as f64, 0.0, 0.0, 0.0];
-        self.known(i, numbers, pieces * pieces, || primitives::sphere(radius, pieces))
+        // All of as many pieces are one mesh.
+        let numbers = [0.0, 1.0, pieces as f64, 0.0, 0.0, 0.0];
+        let ball = self.known(i, numbers, pieces * pieces, || primitives::sphere(1.0, pieces))?;
+        if let Made::Solid(Some(solid)) = ball {
+            self.solids.place(solid, &DAffine3::from_scale(DVec3::splat(radius)));
+        }
+        Ok(ball)
     }
 
     fn cylinder(&mut self, i: usize) -> Result<Made> {
