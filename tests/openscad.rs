@@ -1,8 +1,8 @@
 //! OpenSCAD's models: the solids that we make of a `.csg` file are where OpenSCAD's own mesh of it is.
 //!
-//! The models of tests/openscad are ours, written as .scad and exported by OpenSCAD 2021.01. `SEEN` is what rays see of the meshes
-//! that it makes of them; where there is an OpenSCAD (`LANECAST_OPENSCAD` names it, else `openscad`), its meshes are made anew and
-//! compared ray by ray, and the table with them.
+//! The models of tests/openscad and scenes/openscad are ours, written as .scad and exported by OpenSCAD 2021.01. `SEEN`
+//! is what rays see of the meshes that it makes of them; where there is an OpenSCAD (`LANECAST_OPENSCAD` names it, else
+//! `openscad`), its meshes are made anew and compared ray by ray, and the table with them.
 
 mod binary;
 
@@ -26,6 +26,7 @@ const EDGES: f64 = 0.001;
 
 /// What OpenSCAD's mesh of a model is like.
 struct Seen {
+    /// Its file in the package, without the extension.
     model: &'static str,
     lo: DVec3,
     hi: DVec3,
@@ -40,19 +41,21 @@ const fn seen(model: &'static str, lo: [f64; 3], hi: [f64; 3], hits: usize, dept
 }
 
 const SEEN: [Seen; 9] = [
-    seen("bool", [0.0; 3], [1.0; 3], 0, 0.0),
-    seen("bracket", [0.0; 3], [1.0; 3], 0, 0.0),
-    seen("cyl", [0.0; 3], [1.0; 3], 0, 0.0),
-    seen("hull", [0.0; 3], [1.0; 3], 0, 0.0),
-    seen("lin", [0.0; 3], [1.0; 3], 0, 0.0),
-    seen("off", [0.0; 3], [1.0; 3], 0, 0.0),
-    seen("poly", [0.0; 3], [1.0; 3], 0, 0.0),
-    seen("rot", [0.0; 3], [1.0; 3], 0, 0.0),
-    seen("sphere", [0.0; 3], [1.0; 3], 0, 0.0),
+    seen("tests/openscad/bool", [-5.0, -5.0, -5.0], [23.5, 25.0, 9.0], 1593, 40.59308),
+    seen("tests/openscad/cyl", [-10.0, -20.0, -2.5], [50.0, 40.0, 5.0], 3435, 82.64678),
+    seen("tests/openscad/hull", [-1.66477, -1.80143, -4.5], [70.0, 27.0, 10.0], 929, 74.31821),
+    seen("tests/openscad/lin", [-4.64739, -4.64739, -3.0], [50.0, 21.0, 6.0], 782, 60.24404),
+    seen("tests/openscad/off", [-1.80194, -1.5, 0.0], [71.0, 45.0, 2.0], 1088, 84.33819),
+    seen("tests/openscad/poly", [-10.0, -10.0, -4.75528], [38.0, 49.6, 10.0], 975, 73.20201),
+    seen("tests/openscad/rot", [-7.0, -6.92875, -1.94986], [42.4271, 25.7138, 7.0], 834, 58.53718),
+    seen("tests/openscad/sphere", [-10.0, -9.94522, -9.94522], [29.6194, 29.6194, 9.94522], 1565, 53.58845),
+    seen("scenes/openscad/bracket", [0.0, -25.0, -6.60999], [60.0, 25.0, 60.0], 3537, 97.16018),
 ];
 
-fn file(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/openscad").join(name)
+impl Seen {
+    fn file(&self) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(self.model).with_extension("csg")
+    }
 }
 
 fn scene(path: &Path) -> Description {
@@ -100,7 +103,7 @@ fn fault(seen: &Seen, what: &str, hits: &[Option<f64>]) -> Option<String> {
 
 #[test]
 fn models_are_where_openscad_has_them() {
-    let fault = |seen: &Seen| fault(seen, "ours", &first_hits(&scene(&file(&format!("{}.csg", seen.model))), seen));
+    let fault = |seen: &Seen| fault(seen, "ours", &first_hits(&scene(&seen.file()), seen));
     let faults: Vec<String> = SEEN.iter().filter_map(fault).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
@@ -115,8 +118,8 @@ fn rays_meet_what_they_meet_of_openscads_mesh() {
     let folder = tempfile::tempdir().unwrap();
     let mut faults = Vec::new();
     for seen in &SEEN {
-        let mesh = folder.path().join(format!("{}.stl", seen.model));
-        let model = file(&format!("{}.csg", seen.model));
+        let model = seen.file();
+        let mesh = folder.path().join(model.with_extension("stl").file_name().unwrap());
         let out = Command::new(&program).arg("-o").arg(&mesh).arg(&model).output().unwrap();
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         let theirs = scene(&mesh);
@@ -125,7 +128,8 @@ fn rays_meet_what_they_meet_of_openscads_mesh() {
         let (ours, theirs) = (first_hits(&scene(&model), &found), first_hits(&theirs, &found));
         (found.hits, found.depth) = summary(&theirs);
         // What belongs into the table, if it is not there.
-        println!("    seen({:?}, {lo:?}, {hi:?}, {}, {:.5}),", seen.model, found.hits, found.depth);
+        let [low, high] = [lo, hi].map(|p| p.to_array());
+        println!("    seen({:?}, {low:?}, {high:?}, {}, {:.5}),", seen.model, found.hits, found.depth);
         let size = (hi - lo).length();
         let off = (lo - seen.lo).length().max((hi - seen.hi).length());
         faults.extend((off > 1e-4 * size).then(|| format!("{}: {lo} to {hi}", seen.model)));
@@ -144,7 +148,7 @@ fn rays_meet_what_they_meet_of_openscads_mesh() {
 
 /// All engines agree to the bit, and the oracle explains what they say.
 fn judged<S: Engines>(seen: &Seen, precision: Precision) {
-    let description = scene(&file(&format!("{}.csg", seen.model)));
+    let description = scene(&seen.file());
     let world = World::<S>::compile(&description, Preset::Fast).unwrap();
     let oracle = Oracle::new(&world.assembly);
     let rays = rays::<S>(seen);
@@ -197,7 +201,8 @@ fn rays_meet_known_planes() {
         // From the axis to the middle of a face of the hole, and from a corner of it inwards.
         (DVec3::new(0.0, 0.0, 2.0), DVec3::new(cos, sin, 0.0), Some(bore)),
         (DVec3::new(-20.0, 0.0, 2.0), DVec3::X, Some(10.0)),
-        (DVec3::new(7.0, 0.0, 2.0), DVec3::NEG_X, Some(12.0)),
+        // From within outwards.
+        (DVec3::new(0.0, 7.0, 2.0), DVec3::Y, Some(flat - 7.0)),
     ] {
         let mut rays = Rays::<f64>::new(1);
         rays.set(0, org.to_array(), dir.to_array(), 0.0, f64::INFINITY);

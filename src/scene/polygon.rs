@@ -108,8 +108,9 @@ fn cut(fan: &[[u32; 3]], positions: &[DVec3]) -> Option<Vec<[u32; 3]>> {
     Some(ears(&seen))
 }
 
-/// Triangles of the polygon with these corners, counter-clockwise on the whole: two fewer than there are corners.
-fn ears(points: &[DVec2]) -> Vec<[u32; 3]> {
+/// Triangles of the polygon with these corners, counter-clockwise on the whole: two fewer than there are corners, of which there
+/// are three at least.
+pub(super) fn ears(points: &[DVec2]) -> Vec<[u32; 3]> {
     let mut ring = Ring::new(points);
     let mut triangles = Vec::with_capacity(points.len() - 2);
     // Corners that only touch an ear let it be where nothing else is left.

@@ -212,6 +212,7 @@ impl<'s, 'a, 'r> Builder<'s, 'a, 'r> {
         let Some(map) = map else { return Ok(Made::Nothing) };
         Ok(match all {
             Made::Flat(figure) => {
+                self.work.steps(figure.points().count() as u64).map_err(|what| self.error(i, what))?;
                 let [x, y, to] = [map.x_axis, map.y_axis, map.translation];
                 let column = |v: DVec3, last: f64| DVec3::new(v.x, v.y, last);
                 let flat = DMat3::from_cols(column(x, 0.0), column(y, 0.0), column(to, 1.0));
@@ -365,8 +366,8 @@ impl<'s, 'a, 'r> Builder<'s, 'a, 'r> {
     }
 }
 
-/// Factors that make `old` as large as `new`: where that is not above 0 nothing changes, or, with `auto`, as much as along the
-/// axis of the largest new size.
+/// Factors that make `old` as large as `new`: where that is not above 0 nothing changes, or, with `auto`, as much as
+/// along the axis of the largest new size.
 fn resized(old: DVec3, new: DVec3, auto: [bool; 3]) -> DVec3 {
     let factor = |axis: usize| if new[axis] > 0.0 && old[axis] > 0.0 { new[axis] / old[axis] } else { 1.0 };
     let largest = factor(new.max_position());

@@ -24,12 +24,12 @@ use crate::scene::solids::{NodeId, SolidTree};
 /// Height of a plane figure that is not extruded, as OpenSCAD shows it.
 const PLATE: f64 = 1.0;
 
-/// Reads the bytes of a `.csg` file as a scene called `name`; `references` is where the files are that it imports, which `read`
-/// reads.
+/// Reads the bytes of a `.csg` file as a scene called `name`; `references` is where the files are that it imports,
+/// which `read` reads.
 ///
 /// # Errors
-/// At line and column: what is not in the grammar, modules that are not known or cannot be shown, arguments that make no sense,
-/// files that cannot be read, models that are too large.
+/// At line and column: what is not in the grammar, modules that are not known or cannot be shown, arguments that make
+/// no sense, files that cannot be read, models that are too large.
 pub(super) fn describe(
     file: &Path,
     name: &str,

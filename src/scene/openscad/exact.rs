@@ -1,7 +1,8 @@
 //! On which side of a plane a point is, exactly.
 //!
-//! Source: J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", Discrete &
-//! Computational Geometry 18, 1997. Here is no step between the rounded determinant and the sum of all its terms.
+//! Source: J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates",
+//! Discrete & Computational Geometry 18, 1997. Here is no step between the rounded determinant and the sum of all its
+//! terms.
 
 use std::cmp::Ordering;
 
@@ -10,8 +11,8 @@ use glam::DVec3;
 /// The paper's bound of what rounding does to the determinant.
 const BOUND: f64 = (7.0 + 56.0 * f64::EPSILON) * f64::EPSILON / 2.0;
 
-/// `Greater` if `p` is on the side of the plane through `a`, `b` and `c` from where they go counter-clockwise, `Equal` if it is in
-/// the plane. Products of three coordinates must be neither infinite nor subnormal.
+/// `Greater` if `p` is on the side of the plane through `a`, `b` and `c` from where they go counter-clockwise, `Equal`
+/// if it is in the plane. Products of three coordinates must be neither infinite nor subnormal.
 pub(super) fn side(a: DVec3, b: DVec3, c: DVec3, p: DVec3) -> Ordering {
     let (u, v, w) = (a - p, b - p, c - p);
     let (m, n) = (v.cross(w), DVec3::new(v.y.abs(), v.z.abs(), v.x.abs()));

@@ -2,9 +2,10 @@
 
 use glam::{DVec2, DVec3};
 
+use super::cover::is_convex;
 use super::flat::Flat;
 use super::fragments::{Resolution, direction};
-use super::sweep::{Sweep, is_convex};
+use super::sweep::Sweep;
 use super::work::Work;
 use crate::scene::mesh::Mesh;
 
@@ -32,7 +33,8 @@ pub(super) struct Prisms {
     pub cover: Vec<[u32; 3]>,
 }
 
-/// What `flat` sweeps while it rises, a closed mesh; and its convex parts, if they are known and it is not convex itself.
+/// What `flat` sweeps while it rises, a closed mesh; and its convex parts, if they are known and it is not convex
+/// itself.
 ///
 /// # Errors
 /// Too many slices or triangles; a figure parts of which fall together at the upper end.
@@ -92,8 +94,8 @@ fn slices(flat: &Flat, rise: &Rise, resolution: &Resolution) -> Result<usize, St
     }
 }
 
-/// What `flat`, in the plane of x and z, sweeps while it turns about z by `angle` degrees from `start`, counter-clockwise seen from
-/// above: a closed mesh.
+/// What `flat`, in the plane of x and z, sweeps while it turns about z by `angle` degrees from `start`,
+/// counter-clockwise seen from above: a closed mesh.
 ///
 /// # Errors
 /// A figure on both sides of the axis; too many pieces or triangles.

@@ -8,8 +8,8 @@ use glam::DVec3;
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::{NodeKind, Polyhedron, Solid, SolidTree};
 
-/// Most faces of a mesh that becomes planes. In solids of 64 prisms or balls `stream` traced planes 1.4 to 2 times as fast as a mesh
-/// at 422 faces, 5 times at 66; at 926 they were even.
+/// Most faces of a mesh that becomes planes. In solids of 64 prisms or balls `stream` traced planes 1.4 to 2 times as
+/// fast as a mesh at 422 faces, 5 times at 66; at 926 they were even.
 const MAX_PLANES: usize = 512;
 /// So many triangles have polyhedra of that many faces if three edges meet at each corner.
 const MAX_TRIANGLES: usize = 2 * (2 * MAX_PLANES - 4) - 4;

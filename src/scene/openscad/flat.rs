@@ -1,7 +1,7 @@
 //! Plane figures: polygons with holes, and what is made of several.
 //!
-//! Booleans are those of the crate `i_overlay`, in whole numbers of 64 bits, which hold all digits of the f64 that they come from
-//! but for what the size of the figure hides.
+//! Booleans are those of the crate `i_overlay`, in whole numbers of 64 bits, which hold all digits of the f64 that they
+//! come from but for what the size of the figure hides.
 
 use glam::{DMat3, DVec2};
 use i_overlay::core::fill_rule::FillRule;
@@ -20,6 +20,9 @@ const MAX_CROSSINGS: u64 = 1 << 20;
 
 /// Largest coordinate of what is combined.
 const FARTHEST: f64 = 1e60;
+
+/// Steps that combining takes for each edge, about.
+const COST: u64 = 64;
 
 /// A figure.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -160,6 +163,7 @@ fn check<'c>(contours: impl Iterator<Item = &'c Contour>, work: &mut Work) -> Re
             edges.push([DVec2::from(p), DVec2::from(contour[(i + 1) % contour.len()])]);
         }
     }
+    work.steps(COST * edges.len() as u64)?;
     edges.sort_by(|a, b| a[0].x.min(a[1].x).total_cmp(&b[0].x.min(b[1].x)));
     let mut reached: Vec<[DVec2; 2]> = Vec::new();
     let mut crossings = 0;

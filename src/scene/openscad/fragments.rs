@@ -49,8 +49,8 @@ impl Resolution {
         pieces((360.0 / self.angle).min(radius * 2.0 * PI / self.length).max(5.0).ceil())
     }
 
-    /// Slices of an extrusion to `height` that is twisted by `twist` degrees and scaled to `scale`; `reach`: the square of the
-    /// largest distance of a corner from the axis.
+    /// Slices of an extrusion to `height` that is twisted by `twist` degrees and scaled to `scale`; `reach`: the square
+    /// of the largest distance of a corner from the axis.
     ///
     /// # Errors
     /// More than [`MAX_PIECES`].
@@ -78,8 +78,8 @@ impl Resolution {
         pieces((turn / self.angle).ceil().min((length / self.length).ceil()).max(least))
     }
 
-    /// Slices of an extrusion that is scaled along one axis more than along the other; `shift`: the square of the farthest way of a
-    /// corner.
+    /// Slices of an extrusion that is scaled along one axis more than along the other; `shift`: the square of the
+    /// farthest way of a corner.
     ///
     /// # Errors
     /// More than [`MAX_PIECES`].
@@ -94,8 +94,8 @@ impl Resolution {
     }
 }
 
-/// Cosine and sine of an angle in degrees: exact where they are rational, and alike in all quadrants, so that what is symmetric
-/// stays so.
+/// Cosine and sine of an angle in degrees: exact where they are rational, and alike in all quadrants, so that what is
+/// symmetric stays so.
 pub(super) fn direction(degrees: f64) -> DVec2 {
     let angle = degrees.rem_euclid(360.0);
     let quarter = (angle / 90.0).floor();

@@ -1,9 +1,9 @@
 //! Convex hulls of points in space and in the plane.
 //!
 //! Source: C. B. Barber, D. P. Dobkin, H. Huhdanpaa, "The Quickhull Algorithm for Convex Hulls", ACM Transactions on
-//! Mathematical Software 22(4), 1996. Departures: what is above a face is decided exactly, so faces need no thickness and points in
-//! the plane of a face are never above it; in the plane A. M. Andrew's chains ("Another efficient algorithm for convex hulls in two
-//! dimensions", Information Processing Letters 9, 1979).
+//! Mathematical Software 22(4), 1996. Departures: what is above a face is decided exactly, so faces need no thickness
+//! and points in the plane of a face are never above it; in the plane A. M. Andrew's chains ("Another efficient
+//! algorithm for convex hulls in two dimensions", Information Processing Letters 9, 1979).
 
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -94,7 +94,8 @@ impl Hull<'_> {
         self.share((0..self.points.len() as u32).collect(), 0, work)
     }
 
-    /// Gives each of `points` to the first face from number `first` on that it is above; those that are above none are inside.
+    /// Gives each of `points` to the first face from number `first` on that it is above; those that are above none are
+    /// inside.
     fn share(&mut self, points: Vec<u32>, first: usize, work: &mut Work) -> Result<(), String> {
         for point in points {
             let found = (first..self.faces.len()).find(|&f| self.is_above(self.faces[f].corners, point));

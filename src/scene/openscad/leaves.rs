@@ -98,11 +98,12 @@ impl Builder<'_, '_, '_> {
 
     /// A mesh with these numbers, made if there is none yet.
     fn known(&mut self, i: usize, numbers: [f64; 6], triangles: usize, make: impl FnOnce() -> Mesh) -> Result<Made> {
+        // Each place of it is traced by itself.
+        self.work.triangles(triangles).map_err(|what| self.error(i, what))?;
         let key = numbers.map(f64::to_bits);
         let mesh = match self.known.get(&key) {
             Some(mesh) => mesh.clone(),
             None => {
-                self.work.triangles(triangles).map_err(|what| self.error(i, what))?;
                 let mesh = Arc::new(make());
                 self.solids.tree.closed.push(mesh.clone());
                 self.known.insert(key, mesh.clone());
@@ -188,6 +189,7 @@ impl Builder<'_, '_, '_> {
         let mut at = i;
         while at != self.looks.root as usize {
             at = self.looks.parents[at] as usize;
+            self.work.steps(1).map_err(|what| self.error(i, what))?;
             if !TRANSPARENT.contains(&self.nodes[at].name) {
                 let line = self.source.line(self.nodes[at].at);
                 let what = format!("it has no inside for `{}` in line {line}: {what}", self.nodes[at].name);

@@ -65,8 +65,8 @@ fn linear(color: [f64; 3]) -> DVec3 {
     DVec3::from(color.map(|x| if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }))
 }
 
-/// Looks through all calls, those around others first, and adds warnings to `description`, whose default material gets OpenSCAD's
-/// colour.
+/// Looks through all calls, those around others first, and adds warnings to `description`, whose default material gets
+/// OpenSCAD's colour.
 ///
 /// # Errors
 /// Colours that are none.

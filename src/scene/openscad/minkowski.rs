@@ -1,8 +1,8 @@
 //! `minkowski`: all sums of a point of one operand and a point of the other.
 //!
-//! Of unions of convex parts it is the union of the sums of the parts, and the sum of two convex parts is the hull of the sums of
-//! their corners. In the plane it is around what edges sweep along each other, and the operands themselves, moved to points of each
-//! other.
+//! Of unions of convex parts it is the union of the sums of the parts, and the sum of two convex parts is the hull of
+//! the sums of their corners. In the plane it is around what edges sweep along each other, and the operands themselves,
+//! moved to points of each other.
 
 use glam::{DVec2, DVec3};
 
@@ -14,7 +14,8 @@ use crate::scene::mesh::Mesh;
 /// Most corners whose hull is taken at once, and most parts.
 const MAX_PRODUCT: usize = 1 << 20;
 
-/// The sum of two unions of convex parts, by the corners of those, as meshes whose union it is. A part without volume gives none.
+/// The sum of two unions of convex parts, by the corners of those, as meshes whose union it is. A part without volume
+/// gives none.
 ///
 /// # Errors
 /// Too many parts or corners, too much work.

@@ -1,13 +1,15 @@
 //! OpenSCAD's `.csg` files: what `openscad -o model.csg model.scad` writes, without variables and modules of its own.
 //!
-//! `syntax` reads the calls, `looks` what they inherit (colours, marks), `build` makes solids of them, inner ones first: booleans
-//! become the operations of one [tree of solids](crate::scene::solids), never of meshes; curves become the faces that OpenSCAD gives
-//! them. Plane figures are worked out by themselves (`flat`) and swept to closed meshes (`extrude`).
+//! `syntax` reads the calls, `looks` what they inherit (colours, marks), `build` makes solids of them, inner ones
+//! first: booleans become the operations of one [tree of solids](crate::scene::solids), never of meshes; curves become
+//! the faces that OpenSCAD gives them. Plane figures are worked out by themselves (`flat`) and swept to closed meshes
+//! (`extrude`).
 //!
-//! Nothing recurses over what a file says, and what it may cost is counted (`work`). Memory stays below 256 bytes per byte of
-//! the file while it is read.
+//! Nothing recurses over what a file says, and what it may cost is counted (`work`). Memory stays below 256 bytes per
+//! byte of the file while it is read.
 
 mod build;
+mod cover;
 mod describe;
 mod exact;
 mod extrude;
@@ -43,12 +45,12 @@ pub const MAX_BYTES: u64 = 1 << 28;
 /// A packed one is no larger than one that is not.
 pub const LIMIT: UnpackLimit = UnpackLimit { floor: MAX_BYTES, ratio: 0, cap: MAX_BYTES };
 
-/// Reads the bytes of a file as a scene called `name`, in OpenSCAD's units, z up; `file` is only for error messages. `references`
-/// is where the files are that it imports, which `read` reads.
+/// Reads the bytes of a file as a scene called `name`, in OpenSCAD's units, z up; `file` is only for error messages.
+/// `references` is where the files are that it imports, which `read` reads.
 ///
 /// # Errors
-/// At line and column: what is not in the grammar, modules that are not known or cannot be shown, arguments that make no sense,
-/// files that cannot be read, models that are too large.
+/// At line and column: what is not in the grammar, modules that are not known or cannot be shown, arguments that make
+/// no sense, files that cannot be read, models that are too large.
 pub fn parse(
     file: &Path,
     name: &str,

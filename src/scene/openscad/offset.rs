@@ -1,8 +1,9 @@
 //! `offset`: a figure grown or shrunk by a distance.
 //!
-//! Every edge moves along its normal; between moved edges comes an arc, a point or a cut corner, at notches the corner itself. Of
-//! what that goes around the figure is where it does so counter-clockwise (Chen, McMains, "Polygon offsetting by computing
-//! winding numbers", ASME 2005). Where pieces of arcs begin is OpenSCAD's choice: at the normal of the edge before.
+//! Every edge moves along its normal; between moved edges comes an arc, a point or a cut corner, at notches the corner
+//! itself. Of what that goes around the figure is where it does so counter-clockwise (Chen, McMains, "Polygon
+//! offsetting by computing winding numbers", ASME 2005). Where pieces of arcs begin is OpenSCAD's choice: at the normal
+//! of the edge before.
 
 use std::f64::consts::{PI, TAU};
 
@@ -26,8 +27,9 @@ pub(super) enum Corner {
     Cut,
 }
 
-/// Pieces of a whole circle in offsets by `distance`, where a circle of that radius has `pieces`: about as many. The way from one number
-/// to the other, over how far such pieces are from the circle, is OpenSCAD's, as its roundings decide how arcs of half a piece end.
+/// Pieces of a whole circle in offsets by `distance`, where a circle of that radius has `pieces`: about as many. The
+/// way from one number to the other, over how far such pieces are from the circle, is OpenSCAD's, as its roundings
+/// decide how arcs of half a piece end.
 pub(super) fn arcs(distance: f64, pieces: usize) -> f64 {
     let off = distance.abs() * (1.0 - direction(180.0 / pieces as f64).x);
     let share = off.min(distance.abs() * 0.25) / distance.abs();

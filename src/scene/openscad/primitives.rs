@@ -73,7 +73,8 @@ fn band(mesh: &mut Mesh, below: u32, above: u32, count: usize) {
     }
 }
 
-/// A polyhedron by its points and faces, which may be polygons with notches; and how many of them are too large to be cut well.
+/// A polyhedron by its points and faces, which may be polygons with notches; and how many of them are too large to be
+/// cut well.
 ///
 /// # Errors
 /// Points that are not three finite numbers, faces that name others, more corners than u32 counts.

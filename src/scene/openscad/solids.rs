@@ -11,6 +11,9 @@ use crate::scene::description::{MaterialId, Shape};
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::{NodeId, NodeKind, Solid, SolidNode, SolidTree};
 
+/// Most corners and boxes that are compared.
+const MAX_PAIRS: usize = 1 << 24;
+
 /// Why something cannot be done: byte of what is in the way, and what that is.
 pub(super) type Trouble = (u32, String);
 
@@ -179,8 +182,8 @@ impl Solids {
         Ok(all)
     }
 
-    /// Whether a difference is as large as its first operand: in each direction a farthest corner of that is out of the boxes of
-    /// all others.
+    /// Whether a difference is as large as its first operand: in each direction a farthest corner of that is out of the
+    /// boxes of all others.
     fn keeps_its_box(&self, operands: &[NodeId], map: &DAffine3) -> bool {
         let placed = |node: NodeId| {
             let points = self.points(node).ok()?;
@@ -190,6 +193,9 @@ impl Solids {
             operands[1..].iter().map(|&node| Some(around(&placed(node)?))).collect();
         let (Some(first), Some(boxes)) = (placed(operands[0]), boxes) else { return false };
         let Some((lo, hi)) = around(&first) else { return false };
+        if first.len().saturating_mul(boxes.len()) > MAX_PAIRS {
+            return false;
+        }
         let is_out = |p: &DVec3| boxes.iter().flatten().all(|(lo, hi)| p.cmplt(*lo).any() || p.cmpgt(*hi).any());
         (0..3).all(|axis| [lo, hi].iter().all(|end| first.iter().any(|p| p[axis] == end[axis] && is_out(p))))
     }

@@ -1,11 +1,9 @@
 //! What a figure leaves behind that moves, turns and grows: rings of its corners, walls between rings, ends.
 
-use std::collections::HashMap;
-
 use glam::{DVec2, DVec3};
-use i_triangle::float::unchecked::UncheckedTriangulatable;
 
-use super::flat::{Contour, Flat};
+use super::cover::covered;
+use super::flat::Flat;
 use super::work::Work;
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::flat::closed;
@@ -27,7 +25,7 @@ impl Sweep {
     /// Of `flat`, which will be in `rings` places; `is_open`: with ends.
     ///
     /// # Errors
-    /// Too many triangles, a figure that cannot be covered with triangles.
+    /// Too many triangles, too much work.
     pub fn new(flat: &Flat, rings: usize, is_open: bool, work: &mut Work) -> Result<Self, String> {
         let mut ranges = Vec::new();
         let mut points: Vec<DVec2> = Vec::new();
@@ -41,7 +39,7 @@ impl Sweep {
         let mut cover = Vec::new();
         let mut first = 0;
         for shape in flat.shapes.iter().filter(|_| is_open) {
-            cover.extend(covered(shape)?.into_iter().map(|triangle| triangle.map(|i| first + i)));
+            cover.extend(covered(shape, work)?.into_iter().map(|triangle| triangle.map(|i| first + i)));
             first += shape.iter().map(|contour| contour.len() as u32).sum::<u32>();
         }
         Ok(Self { ranges, is_hole, points, cover, mesh: Mesh::default() })
@@ -52,8 +50,9 @@ impl Sweep {
         self.mesh.positions.extend(self.points.iter().map(|&p| place(p)));
     }
 
-    /// Walls from ring `below` to ring `above`. Of the two ways to cut the one between a corner and the next in two, `is_rising`
-    /// says whether it is the one from the corner below to the next above: it is given both corners, and whether they are of a hole.
+    /// Walls from ring `below` to ring `above`. Of the two ways to cut the one between a corner and the next in two,
+    /// `is_rising` says whether it is the one from the corner below to the next above: it is given both corners, and
+    /// whether they are of a hole.
     pub fn walls(&mut self, [below, above]: [usize; 2], is_rising: impl Fn(DVec2, DVec2, bool) -> bool) {
         let count = self.points.len() as u32;
         let (below, above) = (below as u32 * count, above as u32 * count);
@@ -98,34 +97,4 @@ fn push(mesh: &mut Mesh, triangle: [u32; 3]) {
     if a != b && b != c && c != a {
         mesh.triangles.push(triangle);
     }
-}
-
-/// Triangles of a polygon with holes, by numbers of its points.
-fn covered(shape: &[Contour]) -> Result<Vec<[u32; 3]>, String> {
-    if let [only] = shape
-        && is_convex(only)
-    {
-        return Ok((1..only.len() as u32 - 1).map(|i| [0, i, i + 1]).collect());
-    }
-    let raw = shape.unchecked_triangulate_as::<i64>();
-    let mut number_of = HashMap::new();
-    for (point, number) in shape.iter().flatten().zip(0_u32..) {
-        number_of.insert(raw.adapter.float_to_int(point), number);
-    }
-    let numbers: Option<Vec<u32>> = raw.raw.points().iter().map(|point| number_of.get(point).copied()).collect();
-    let numbers = numbers.ok_or("its polygons cannot be covered with triangles")?;
-    let corners = raw.triangle_indices::<u32>();
-    let triangles = corners.as_chunks::<3>().0.iter();
-    Ok(triangles.map(|triangle| triangle.map(|corner| numbers[corner as usize])).collect())
-}
-
-/// Whether a contour, counter-clockwise, has no notch and goes round once.
-pub(super) fn is_convex(contour: &[[f64; 2]]) -> bool {
-    let count = contour.len();
-    let p = |i: usize| DVec2::from(contour[i % count]);
-    let turns = (0..count).all(|i| (p(i + 1) - p(i)).perp_dot(p(i + 2) - p(i + 1)) >= 0.0);
-    // Once round, the way goes from left to right and back.
-    let to_right = |i: usize| p(i + 1).x > p(i).x;
-    let changes = (0..count).filter(|&i| to_right(i) != to_right(i + 1)).count();
-    count > 2 && turns && changes <= 2
 }
