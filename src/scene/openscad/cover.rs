@@ -48,8 +48,8 @@ pub(super) fn covered(shape: &[Contour], work: &mut Work) -> Result<Vec<[u32; 3]
     let corner = |i: usize| corners[i % corners.len()];
     let is_notch = |&i: &usize| (corner(i + 1) - corner(i)).perp_dot(corner(i + 2) - corner(i + 1)) <= 0.0;
     let notches = (0..corners.len()).filter(is_notch).count();
-    // A corner is tried anew when a neighbour was cut off.
-    work.steps(3 * (corners.len() * notches) as u64)?;
+    // To see that a notch is far from a corner takes less than a step.
+    work.steps((corners.len() * notches / 8) as u64)?;
     Ok(ears(&corners).into_iter().map(|triangle| triangle.map(|i| ring[i as usize])).collect())
 }
 

@@ -78,7 +78,11 @@ pub(super) fn rise(
         sweep.end(slices, true);
     }
     sweep.end(0, false);
-    Ok((sweep.finish()?, prisms))
+    let mesh = sweep.finish().map_err(|what| match is_flat_above {
+        true => format!("scaled to a line it does not close: {what}"),
+        false => what,
+    })?;
+    Ok((mesh, prisms))
 }
 
 /// How many slices OpenSCAD makes.

@@ -3,6 +3,8 @@
 //! Booleans are those of the crate `i_overlay`, in whole numbers of 64 bits, which hold all digits of the f64 that they
 //! come from but for what the size of the figure hides.
 
+use std::panic::{UnwindSafe, catch_unwind};
+
 use glam::{DMat3, DVec2};
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay_rule::OverlayRule;
@@ -134,8 +136,7 @@ fn combined(first: Flat, others: &[Flat], rule: OverlayRule, work: &mut Work) ->
     }
     let (subject, clip) = (contours(std::slice::from_ref(&first)), contours(others));
     check(subject.iter().chain(&clip), work)?;
-    let mut overlay = FloatOverlay::<Point, i64>::from_subj_and_clip(&subject, &clip);
-    Ok(Flat { shapes: overlay.overlay(rule, FillRule::NonZero) })
+    caught(|| FloatOverlay::<Point, i64>::from_subj_and_clip(&subject, &clip).overlay(rule, FillRule::NonZero))
 }
 
 fn contours(figures: &[Flat]) -> Vec<Contour> {
@@ -148,8 +149,15 @@ fn resolved(contours: &[Contour], rule: FillRule, work: &mut Work) -> Result<Fla
     if contours.is_empty() {
         return Ok(Flat::default());
     }
-    let mut overlay = FloatOverlay::<Point, i64>::from_subj(&contours);
-    Ok(Flat { shapes: overlay.overlay(OverlayRule::Subject, rule) })
+    caught(|| FloatOverlay::<Point, i64>::from_subj(&contours).overlay(OverlayRule::Subject, rule))
+}
+
+/// The figure of `shapes`; a panic of what makes them is an error. Contours that bound nothing are left out.
+fn caught(shapes: impl FnOnce() -> Vec<Vec<Contour>> + UnwindSafe) -> Result<Flat, String> {
+    let mut shapes = catch_unwind(shapes).map_err(|_| "its outlines cannot be combined")?;
+    shapes.retain(|shape| shape.first().is_some_and(|outer| outer.len() > 2));
+    shapes.iter_mut().for_each(|shape| shape.retain(|contour| contour.len() > 2));
+    Ok(Flat { shapes })
 }
 
 /// Refuses contours whose edges cross too often to be combined: of a few thousand edges each may cross each.
