@@ -16,6 +16,11 @@ use super::work::Work;
 /// Most corners of an outline.
 const MAX_POINTS: usize = 1 << 21;
 
+/// Corners that are nearer than this are one, as for OpenSCAD; and nearer than this, relative to the outline, so that
+/// small ones stay.
+const NEAR: f64 = 1.5 / 65536.0;
+const NEAR_OF_SIZE: f64 = 1e-6;
+
 /// How corners are filled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Corner {
@@ -48,9 +53,15 @@ pub(super) fn offset(figure: &Flat, distance: f64, corner: Corner, work: &mut Wo
 
 fn moved(contour: &Contour, distance: f64, corner: Corner, work: &mut Work) -> Result<Contour, String> {
     let mut points: Vec<DVec2> = contour.iter().map(|&p| DVec2::from(p)).collect();
-    points.dedup();
-    while points.len() > 1 && points.first() == points.last() {
+    // What rounding doubled has no edge between that says where it faces.
+    let size = points.iter().map(|&p| p.distance_squared(points[0])).fold(0.0, f64::max).sqrt();
+    let near = NEAR.min(size * NEAR_OF_SIZE);
+    points.dedup_by(|a, b| a.distance(*b) <= near);
+    while points.len() > 1 && points[0].distance(points[points.len() - 1]) <= near {
         points.pop();
+    }
+    if points.len() < 3 {
+        return Ok(Vec::new());
     }
     let count = points.len();
     let normal = |i: usize| (points[(i + 1) % count] - points[i]).normalize_or_zero().perp() * -1.0;

@@ -235,6 +235,9 @@ fn figures_are_combined_offset_and_summed() {
     let cut = 1.0 - (2.0 - 2f64.sqrt()).powi(2) / 2.0;
     near(area(&format!("offset(delta = 1, chamfer = true) {l}")), 7.0 + 16.0 - 1.0 + 5.0 * cut);
     assert!(is_empty("linear_extrude(height = 1) offset(r = -1) square(size = 1);"));
+    // Where roundings double a corner, it is one all the same.
+    let doubled = "polygon(points = [[0,0],[2,0],[2,1.9999999999],[2.0000000001,2],[2,2],[0,2]]);";
+    near(area(&format!("offset(delta = 1) {doubled}")), 16.0);
 }
 
 #[test]
