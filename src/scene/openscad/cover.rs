@@ -1,8 +1,8 @@
 //! Polygons with holes as triangles that cover them.
 //!
-//! Holes are joined to the outer contour by bridges, from the right to the left (D. Eberly, "Triangulation by Ear Clipping",
-//! 2002), and the one contour that comes of it is cut into ears. Whatever the numbers are, every edge of a contour is in one
-//! triangle, and every other edge in two that go along it both ways: what is swept stays closed.
+//! Holes are joined to the outer contour by bridges, from the right to the left (D. Eberly, "Triangulation by Ear
+//! Clipping", 2002), and the one contour that comes of it is cut into ears. Whatever the numbers are, every edge of a
+//! contour is in one triangle, and every other edge in two that go along it both ways: what is swept stays closed.
 
 use glam::DVec2;
 
@@ -10,8 +10,8 @@ use super::flat::{Contour, Point};
 use super::work::Work;
 use crate::scene::polygon::ears;
 
-/// Triangles of a polygon by the numbers of its points, counted through its contours: the outer one, counter-clockwise, then
-/// those of holes, clockwise.
+/// Triangles of a polygon by the numbers of its points, counted through its contours: the outer one, counter-clockwise,
+/// then those of holes, clockwise.
 ///
 /// # Errors
 /// Too much work.
