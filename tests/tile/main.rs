@@ -9,4 +9,5 @@ mod engine;
 mod instances;
 mod joined;
 mod order;
+mod parallel;
 mod pencil;

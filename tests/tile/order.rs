@@ -75,7 +75,14 @@ fn another_tree_gives_the_same_bits() {
                 _ => camera(eye, r.in_cube(), [0.1, 0.5, 1.0][case % 3], 96),
             };
             let light = 6.0 * r.in_cube();
-            for rays_of in [mirrored(&worlds[0], &primary), shadows(&worlds[0], &primary, light, 1.0, 1e-4), primary] {
+            let mut parallel = primary.clone();
+            let dir = primary.dir(0);
+            for i in 0..parallel.len() {
+                let org = std::array::from_fn(|a| primary.org(i)[a] + 2.0 * (primary.dir(i)[a] - dir[a]));
+                parallel.set(i, org, dir, 0.0, f32::INFINITY);
+            }
+            let shadow = shadows(&worlds[0], &primary, light, 1.0, 1e-4);
+            for rays_of in [mirrored(&worlds[0], &primary), shadow, parallel, primary] {
                 let wanted = answers(&worlds[0], &rays_of);
                 rays += rays_of.live_count();
                 hits += wanted.0.iter().filter(|hit| hit[3] != u32::MAX).count();

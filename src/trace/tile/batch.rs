@@ -31,11 +31,11 @@ use crate::shape::Block;
 pub const BATCH: usize = 16;
 
 /// Spanned volume (of a scene of unit size) from which on products of coordinates keep their digits.
-const LEAST_VOLUME: f32 = 1e-30;
+pub const LEAST_VOLUME: f32 = 1e-30;
 
 /// The same volume as a part of the lengths it is the product of: well above what f64 rounds to, in which weights are told. Not more, as
 /// blocks on a grid have many sides that are seen from their own plane but for the rounding of f32, which moves them like corners.
-const LEAST_PART: f32 = 1e-9;
+pub const LEAST_PART: f32 = 1e-9;
 
 /// Edge functions that change sign within the tile may be wrong by what moves an edge this far, in half ulps of the
 /// distance.
@@ -69,7 +69,7 @@ pub struct Batch {
     pub slot: [u32; BATCH + 8],
     /// Groups that met the leaf.
     pub groups: [u64; BATCH + 8],
-    len: usize,
+    pub len: usize,
 }
 
 impl Default for Batch {
@@ -191,7 +191,11 @@ impl Batch {
         });
         let (d1, d2) = (minus(p[1], p[0]), minus(p[2], p[0]));
         if !EXACT {
-            return self.set_up_own::<ANY>(groups, planes, &p, cross_accurate(d1, d2));
+            let normal = cross_accurate(d1, d2);
+            return match &groups.frame.parallel {
+                Some(parallel) => self.set_up_parallel::<ANY>(parallel, groups, planes, &p, normal),
+                None => self.set_up_own::<ANY>(groups, planes, &p, normal),
+            };
         }
         let normal = cross(d1, d2);
         let volume = dot(normal, p[0]);
@@ -247,10 +251,13 @@ impl Batch {
     /// Set-up for segments that start anywhere. Not from the corners in the frame: theirs is another normal, if the triangle
     /// is a needle. Returns the triangles that some segment may start behind.
     #[inline(always)]
-    fn set_up_side(&self, groups: &Groups, planes: &mut Planes) -> u32 {
+    pub fn set_up_side(&self, groups: &Groups, planes: &mut Planes) -> u32 {
         let (corner, sides) = self.sides(groups);
         let normal = cross_accurate(sides[0], sides[1]);
-        let from_apex = each(|a| corner[a] - V::splat(groups.frame.apex[a] * groups.frame.scale));
+        let from_apex = match &groups.frame.parallel {
+            Some(parallel) => parallel.view.map(|x| V::splat(x * groups.frame.scale)),
+            None => each(|a| corner[a] - V::splat(groups.frame.apex[a] * groups.frame.scale)),
+        };
         let volume = dot(normal, from_apex);
         let back = volume.cmp_lt(V::constant(0.0));
         let normal = map3(normal, |x| select(back, -x, x));
@@ -324,7 +331,7 @@ impl Batch {
 /// Triangles whose weights f32 tells well enough, by their edge functions, what may be wrong with these, and the depth of the farthest
 /// corner.
 #[inline(always)]
-fn steady(groups: &Groups, p: &[Lanes3<V>; 3], (edges, eps): (&[Lanes3<V>; 3], &[V; 3]), high: V) -> Mask {
+pub fn steady(groups: &Groups, p: &[Lanes3<V>; 3], (edges, eps): (&[Lanes3<V>; 3], &[V; 3]), high: V) -> Mask {
     let most = sum(p[0]).fast_max(sum(p[1])).fast_max(sum(p[2])) * V::splat(MOST_SHIFT);
     let is_steady = |k: usize| {
         // The edge's length as it is seen: its function's slope is that times the depth. An edge that is seen end-on moves far.
@@ -346,7 +353,7 @@ impl Planes {
     /// Keeps the linear functions; returns the triangles whose largest values over the tile do not rule them out.
     /// `bound` is the largest 1/z that may be found, from the largest value of its function.
     #[inline(always)]
-    fn store(&mut self, groups: &Groups, linear: &[Lanes3<V>; 4], eps: V, bound: impl Fn(V) -> V) -> u32 {
+    pub fn store(&mut self, groups: &Groups, linear: &[Lanes3<V>; 4], eps: V, bound: impl Fn(V) -> V) -> u32 {
         let zero = V::constant(0.0);
         let [[s0, s1], [t0, t1]] = splats(&groups.bounds);
         let mut seen = V::splat(f32::INFINITY);

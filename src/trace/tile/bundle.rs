@@ -18,6 +18,18 @@ pub enum Shared {
     End(At),
     /// They pass through it before they start.
     Behind,
+    /// There is none: they go where the tile looks, all in one direction ([`super::parallel`]).
+    Along,
+    /// Any-hit: they go to where the tile is seen from, all in one direction.
+    Against,
+}
+
+impl Shared {
+    /// Whether rays have a direction in common instead of a point.
+    #[inline(always)]
+    pub fn is_direction(self) -> bool {
+        matches!(self, Self::Along | Self::Against)
+    }
 }
 
 /// Parameter of a common end.
@@ -45,7 +57,7 @@ pub struct Bundle<'a> {
     pub source: Source<'a>,
     /// First ray.
     pub first: usize,
-    /// The common point.
+    /// The common point; of rays of one direction some point among their lines.
     pub apex: [f32; 3],
     /// No ray's line passes the common point at more than this distance (before the rounding of differences).
     pub slack: f32,
@@ -213,8 +225,8 @@ impl<'a> Bundle<'a> {
     pub fn ways(&self, g: usize) -> Lanes3<V> {
         let at = self.first + g * V::N;
         match (self.source, self.shared) {
-            (Source::Batch(rays), Shared::Start | Shared::Behind) => load3(&rays.dir, at),
-            (Source::Batch(rays), Shared::End(_)) => {
+            (Source::Batch(rays), Shared::Start | Shared::Behind | Shared::Along) => load3(&rays.dir, at),
+            (Source::Batch(rays), Shared::End(_) | Shared::Against) => {
                 let org = load3(&rays.org, at);
                 each(|a| org[a] - V::splat(self.apex[a]))
             }
@@ -233,12 +245,12 @@ impl<'a> Bundle<'a> {
         let ray = self.first + g * V::N + lane;
         match self.shared {
             Shared::Start | Shared::Behind => rays.dir(ray),
-            Shared::End(_) => each(|a| rays.org[a][ray] - self.apex[a]),
+            Shared::End(_) | Shared::Along | Shared::Against => each(|a| rays.org[a][ray] - self.apex[a]),
         }
     }
 
     #[inline(always)]
-    fn sort_lanes(&mut self, rays: &Rays<f32>) {
+    pub fn sort_lanes(&mut self, rays: &Rays<f32>) {
         let columns = Columns::of(rays);
         for g in 0..self.len {
             columns.prefetch(self.first / V::N + g + AHEAD);

@@ -8,6 +8,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::bundle::{Bundle, Source};
+use super::parallel::Parallel;
 use super::{Mask, SET, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::math::Aabb;
@@ -27,6 +28,8 @@ pub struct Frame {
     pub scale: f32,
     /// Largest coordinate of the scene as seen from the apex, any axis, before scaling.
     pub extent: f32,
+    /// Of rays of one direction.
+    pub parallel: Option<Parallel>,
 }
 
 impl Frame {
@@ -38,28 +41,24 @@ impl Frame {
         let extent = reach(bounds, apex);
         let exponent = exponent(extent).filter(|exponent| EXPONENTS.contains(exponent))?;
         let scale = f32::from_bits(((127 - exponent) as u32) << 23);
+        let parallel = None;
         let rays = match bundle.source {
             Source::Batch(rays) => rays,
             Source::Pencil(pencil, [s, t]) => {
                 let [u, v, a] = pencil.axes;
                 let axes = [each(|x| u[x] - s * a[x]), each(|x| v[x] - t * a[x]), a];
-                return Some(Self { apex, axes: map3(axes, |axis| axis.map(|x| x as f32 * scale)), scale, extent });
+                let axes = map3(axes, |axis| axis.map(|x| x as f32 * scale));
+                return Some(Self { apex, axes, scale, extent, parallel });
             }
         };
         let [sum, across, along] = Self::mean_direction::<N>(bundle, rays, groups);
+        if bundle.shared.is_direction() {
+            return Self::parallel(bundle, rays, bounds, (scale, extent), [across, along]);
+        }
         let a = normalised(sum)?;
-        let flat = |r: [f64; 3]| sub(r, a.map(|x| x * dot(r, a)));
-        // A light may see pixels as flat parallelograms: rectangles fit them best along their longer side.
-        let (across, along) = (flat(across), flat(along));
-        let long = if dot(across, across) < dot(along, along) { along } else { across };
-        // One direction, or directions on a line through the apex: any perpendicular axis does.
-        let u = normalised(long).or_else(|| {
-            let other = if a[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-            normalised(flat(other))
-        })?;
-        let v = [a[1] * u[2] - a[2] * u[1], a[2] * u[0] - a[0] * u[2], a[0] * u[1] - a[1] * u[0]];
+        let [u, v] = sides(a, across, along)?;
         let axes = [u, v, a].map(|axis| axis.map(|x| x as f32 * scale));
-        Some(Self { apex, axes, scale, extent })
+        Some(Self { apex, axes, scale, extent, parallel })
     }
 
     /// Sum of unit directions of a sample of the rays, and the same with the left half of the picture negative, and the upper half.
@@ -122,7 +121,7 @@ impl Frame {
             let axis = DVec3::from(axis.map(f64::from));
             [m.x_axis.dot(axis) as f32, m.y_axis.dot(axis) as f32, m.z_axis.dot(axis) as f32]
         });
-        Self { apex, axes, scale: self.scale, extent: reach(bounds, apex) }
+        Self { apex, axes, scale: self.scale, extent: reach(bounds, apex), parallel: None }
     }
 
     /// Vectors in this frame.
@@ -149,11 +148,26 @@ pub fn reach(bounds: &Aabb<f32>, apex: [f32; 3]) -> f32 {
     x.max(y).max(z)
 }
 
+/// Unit vectors right and up of the depth axis `a`. A light may see pixels as flat parallelograms: rectangles fit them best along
+/// their longer side, of the picture's two.
+pub fn sides(a: [f64; 3], across: [f64; 3], along: [f64; 3]) -> Option<[[f64; 3]; 2]> {
+    let flat = |r: [f64; 3]| sub(r, a.map(|x| x * dot(r, a)));
+    let (across, along) = (flat(across), flat(along));
+    let long = if dot(across, across) < dot(along, along) { along } else { across };
+    // One direction, or directions on a line through the apex: any perpendicular axis does.
+    let u = normalised(long).or_else(|| {
+        let other = if a[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+        normalised(flat(other))
+    })?;
+    Some([u, [a[1] * u[2] - a[2] * u[1], a[2] * u[0] - a[0] * u[2], a[0] * u[1] - a[1] * u[0]]])
+}
+
 fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-fn normalised(v: [f64; 3]) -> Option<[f64; 3]> {
+/// A vector of length one; `None` of next to none.
+pub fn normalised(v: [f64; 3]) -> Option<[f64; 3]> {
     let length = dot(v, v).sqrt();
     (length > 1e-6 && f64::MAX > length).then(|| v.map(|x| x / length))
 }

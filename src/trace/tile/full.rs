@@ -83,6 +83,13 @@ impl Groups {
                 }
                 found.is_some()
             }
+            (Shared::Along | Shared::Against, Source::Batch(rays)) if bundle.presumed => {
+                match self.fill_parallel::<N, ANY>(bundle, &Columns::of(rays)) {
+                    Some(way) => *reach = way,
+                    None => return false,
+                }
+                true
+            }
             _ => false,
         }
     }
@@ -165,6 +172,42 @@ impl Groups {
             self.look_far(q);
         }
         sure.holds().then_some((look, reach))
+    }
+
+    /// Whole rays of one direction, and how far from the apex they start at most.
+    #[inline(never)]
+    fn fill_parallel<const N: usize, const ANY: bool>(&mut self, bundle: &Bundle, columns: &Columns) -> Option<V> {
+        let from = bundle.first / V::N;
+        let infinite = V::splat(f32::INFINITY);
+        let (frame, asked, scale) = (self.frame, self.asked, V::splat(self.frame.scale));
+        let parallel = frame.parallel?;
+        let (dir, apex) = (parallel.dir.map(V::splat), bundle.apex.map(V::splat));
+        let (mut sure, mut reach) = (Sure::new(), V::constant(0.0));
+        for q in 0..N {
+            for i in 0..SET {
+                let g = q * SET + i;
+                columns.prefetch_from(asked, from + g + AHEAD);
+                let group = columns.get(from + g);
+                let [x, y, z] = each(|a| group.dir[a] ^ dir[a]);
+                sure.other = sure.other | x | y | z | group.t_min | (group.t_max ^ infinite);
+                sure.total += sum(group.org);
+                let way = each(|a| group.org[a] - apex[a]);
+                reach = largest(way).fast_max(reach);
+                let [s, t, above] = frame.coordinates(way);
+                let height = above + V::splat(parallel.height);
+                let far = if ANY { parallel.far(above, height) } else { V::constant(0.0) };
+                self.put(g, [s, t, V::constant(1.0)], far);
+                self.of[g].start = map3(group.org, |x| x * scale);
+                self.behind[g] = height;
+            }
+            if !sure.same() {
+                return None;
+            }
+            self.surround(q);
+            self.look_far(q);
+        }
+        let total: f32 = sure.total.to_array().iter().sum();
+        (total <= TAME.1).then_some(reach)
     }
 
     /// Puts the rays of group `g` in their place, which look as far as `inv_lo`.

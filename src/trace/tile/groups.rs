@@ -6,10 +6,11 @@ use super::even::Even;
 use super::frame::Frame;
 use super::lines::Lines;
 use super::listing;
+use super::parallel;
 use super::presumed::Look;
 use super::starts::{Room, Starts};
 use super::{GROUPS, HALF_ULP, Mask, SET, SETS, V, select};
-use crate::lanes::minima::{quarter_minima, quarters, row_minima_of};
+use crate::lanes::minima::{quarter_minima, quarters};
 use crate::lanes::words::{greatest, least};
 use crate::lanes::{LaneMask, Lanes, Lanes3, map3};
 use crate::scene::world::World;
@@ -87,7 +88,7 @@ pub struct Groups {
     /// least negatives: one kind of shuffle tree does both.
     pub ends: [V; SET],
     /// How far behind, by group and in the rays' parameter. Apart from [`Group`], as other tiles do not need it.
-    behind: [V; GROUPS],
+    pub behind: [V; GROUPS],
     /// Own answers: which part of the way from that point to the best hit is ahead of the start.
     pub ahead: [V; GROUPS],
     /// Of a full tile of segments to a common end: where they start.
@@ -195,6 +196,8 @@ impl Groups {
         let full = !EXACT && groups == all && self.fill::<N, ANY>(bundle, &mut look, &mut reach);
         if full {
             whole = all;
+        } else if bundle.presumed && bundle.shared.is_direction() {
+            return false;
         } else {
             for q in 0..N {
                 for i in 0..SET {
@@ -242,8 +245,10 @@ impl Groups {
                     if ANY {
                         reach = select(lanes, lines.reach, reach).fast_max(reach);
                     }
-                    if bundle.shared == Shared::Behind {
+                    if matches!(bundle.shared, Shared::Behind | Shared::Along) {
                         self.behind[g] = lines.behind;
+                    }
+                    if bundle.shared == Shared::Behind {
                         front = select(lanes, lines.behind / lines.slowness, front).fast_min(front);
                     }
                 }
@@ -281,6 +286,8 @@ impl Groups {
                 }
             }
         }
+        let full =
+            full || bundle.shared == Shared::Against && bundle.tame[..N * SET].iter().all(|lanes| *lanes == V::ALL);
         self.starts = (full && ANY && bundle.shared != Shared::Start).then(|| Starts::of(&self.of[..N * SET]));
         self.endless = whole == all;
         self.ends_early = least(near) < f32::INFINITY;
@@ -288,10 +295,13 @@ impl Groups {
             listing::groups(whole).for_each(|g| self.of[g].inv_hi = most);
         }
         self.slack = (bundle.slack + 8.0 * HALF_ULP * greatest(reach)) * self.frame.scale;
-        self.is_behind = bundle.shared == Shared::Behind;
+        if bundle.shared.is_direction() && greatest(reach) > parallel::FAR * self.frame.extent {
+            return false;
+        }
+        self.is_behind = matches!(bundle.shared, Shared::Behind | Shared::Along);
         self.room = if EXACT { None } else { Room::of::<N>(self, bundle, groups) };
         (self.front, self.loose) = (0.0, 32.0 * HALF_ULP * (1.0 + self.wide));
-        if self.is_behind {
+        if bundle.shared == Shared::Behind {
             let front = least(front);
             self.loose += 4.0 * self.slack / front;
             if !(0.0..=MOST_LOOSE).contains(&self.loose) {
@@ -315,36 +325,18 @@ impl Groups {
         [self.rect[1][0][q], self.rect[1][1][q]] = [low_t, -high_t];
     }
 
-    /// The ends of the segments, moved apart by what rounding may have done to them.
-    #[inline(always)]
-    fn loosen<const N: usize, const ANY: bool, const EXACT: bool>(&mut self, near: V) {
-        let loose = self.loose;
-        let (less, more) = (V::splat(1.0 - loose), V::splat(1.0 + loose));
-        if ANY && !EXACT {
-            // How far a segment goes is told by its start: only whether a box is within reach is left to its depth.
-            self.reach = 1.0 - loose;
-        } else {
-            self.of[..N * SET].iter_mut().for_each(|group| group.inv_lo *= less);
-        }
-        if EXACT || self.ends_early {
-            self.of[..N * SET].iter_mut().for_each(|group| group.inv_hi *= more);
-        }
-        self.least.iter_mut().for_each(|least| *least *= less);
-        self.cap = least(near) * (1.0 - loose);
-    }
-
-    /// Which of a group's `lanes` found something (any-hit): those that want nothing any more.
-    #[inline(always)]
-    pub fn done(&self, g: usize, lanes: u32) -> u32 {
-        V::splat(f32::INFINITY).cmp_le(self.of[g].inv_lo).bits() & lanes
-    }
-
     /// How far a group's rays have gone from the common point, in their parameter, where that is `t`. Never minus zero, which a
     /// corner at the common point gives, and whose reciprocal would lie behind all.
     #[inline(always)]
     pub fn way(&self, g: usize, t: V) -> V {
         let from = if self.is_behind { self.behind[g] } else { V::constant(0.0) };
         t + from
+    }
+
+    /// What weights of hits at 1/z = `inverse` are kept in units of: where rays have a point in common they are linear only times 1/z.
+    #[inline(always)]
+    pub fn unit(&self, inverse: V) -> V {
+        if self.frame.parallel.is_some() { V::constant(1.0) } else { inverse }
     }
 
     /// The smallest values of some linear functions over the tile's rectangle.
@@ -354,34 +346,6 @@ impl Groups {
         let [[s0, s1], [t0, t1]] = splats(&self.bounds);
         let (s, t) = (select(f[0].cmp_lt(zero), s1, s0), select(f[1].cmp_lt(zero), t1, t0));
         f[0].mul_add(s, f[1].mul_add(t, f[2]))
-    }
-
-    /// Brings the depths of the `changed` groups up to date.
-    #[inline(always)]
-    pub fn refresh<const N: usize>(&mut self, changed: u64) {
-        for q in (0..N).filter(|q| N == 1 || changed >> (q * SET) & 0xffff != 0) {
-            self.look_far(q);
-            self.least[q] *= V::splat(self.reach);
-        }
-        self.settle::<N>();
-    }
-
-    /// How far the groups of a set look, by the ends of their rays' segments or what these found.
-    #[inline(always)]
-    pub fn look_far(&mut self, q: usize) {
-        if let Some(of) = self.of[q * SET..].first_chunk::<SET>() {
-            self.least[q] = row_minima_of(|i| of[i].inv_lo);
-        }
-    }
-
-    /// How far all groups look, where the least reciprocals are known.
-    #[inline(always)]
-    fn settle<const N: usize>(&mut self) {
-        let near = (1..N).fold(self.least[0], |near, q| near.fast_min(self.least[q]));
-        self.nearest = least(near);
-        // A little farther than the reciprocal, whatever its rounding.
-        self.farthest =
-            if self.nearest < f32::INFINITY { (1.0 + 4.0 * HALF_ULP) / self.nearest } else { f32::NEG_INFINITY };
     }
 }
 

@@ -22,7 +22,8 @@ pub struct Lines {
     pub fit: u32,
     /// Distance from the common end (0 for a common start).
     pub reach: V,
-    /// How far the common point is behind where segments start, in the rays' parameter.
+    /// How far the common point is behind where segments start, in the rays' parameter. Of rays of one direction: their height at
+    /// parameter zero.
     pub behind: V,
     /// Where segments start, of rays without a common start.
     pub start: Lanes3<V>,
@@ -46,14 +47,17 @@ impl Lines {
     /// Those of the lanes `tame` of a group of rays in memory.
     #[inline(always)]
     pub fn of(frame: &Frame, bundle: &Bundle, segments: &Segments, tame: u32) -> Self {
+        if let Some(parallel) = &frame.parallel {
+            return parallel.lines(frame, bundle, segments, tame);
+        }
         let (zero, one, infinite) = (V::constant(0.0), V::constant(1.0), V::splat(f32::INFINITY));
         let Segments { org, dir, t_min, t_max } = *segments;
         // Where a segment starts or ends at zero, the depth there is infinite, not its negative.
         let [t_min, t_max] = [t_min + zero, t_max + zero];
         let apex = map3(bundle.apex, V::splat);
         let direction = match bundle.shared {
-            Shared::Start | Shared::Behind => dir,
-            Shared::End(_) => each(|a| org[a] - apex[a]),
+            Shared::Start | Shared::Behind | Shared::Along => dir,
+            Shared::End(_) | Shared::Against => each(|a| org[a] - apex[a]),
         };
         let [x, y, speed] = frame.coordinates(direction);
         let slowness = one / speed;
@@ -66,7 +70,7 @@ impl Lines {
         let (far, near, reach, whole) = match bundle.shared {
             Shared::Start if is_whole(infinite) => (zero, infinite, zero, true),
             Shared::End(At::One) if is_whole(one) => (slowness, infinite, largest(direction), true),
-            Shared::Start => (slowness / t_max, slowness / t_min, zero, false),
+            Shared::Start | Shared::Along | Shared::Against => (slowness / t_max, slowness / t_min, zero, false),
             Shared::Behind => {
                 start = starts();
                 let way = each(|a| start[a] - apex[a]);

@@ -1,5 +1,5 @@
-//! Tiles: up to 1024 rays with a common origin, a common end (any-hit), or a common point behind them ([`mirror`]),
-//! through the tree of widest nodes together.
+//! Tiles: up to 1024 rays with a common origin, a common end (any-hit), a common point behind them ([`mirror`]), or one direction
+//! ([`parallel`]), through the tree of widest nodes together.
 //!
 //! The speed comes from doing per tile what packets do per ray: one node test is all its boxes against the whole tile,
 //! triangles are set up once per tile, and a ray's share of a triangle test is four linear functions of its two
@@ -38,8 +38,10 @@ mod node;
 mod others;
 mod own;
 mod pairs;
+mod parallel;
 mod place;
 mod presumed;
+mod reach;
 mod shapes;
 mod slab;
 mod spans;
@@ -207,7 +209,13 @@ impl<'a> Job<'a> {
                 self.missed(first);
                 continue;
             }
-            let scattered = matches!(look, First::Scattered);
+            if let First::Parallel = look
+                && !EXACT
+                && self.parallel::<ANY, COUNT>(first)
+            {
+                continue;
+            }
+            let scattered = matches!(look, First::Scattered | First::Parallel);
             if self.most == GROUPS
                 && !scattered
                 && let Some(mut bundle) = Bundle::find::<SETS>(self.rays, first, ANY)
@@ -303,12 +311,14 @@ impl<'a> Job<'a> {
         if !self.memory.groups.load::<N, ANY, EXACT>(bundle, groups, self.world) {
             return false;
         }
-        if !self.memory.groups.is_behind && self.memory.groups.are_mixed::<N>() {
+        if bundle.shared != Shared::Behind && self.memory.groups.are_mixed::<N>() {
             self.leave_some(bundle, groups);
             return !matches!(bundle.source, Source::Pencil(..));
         }
         if self.is_dense::<N>() {
-            self.memory.apart.extend(listing::groups(groups).map(|g| bundle.first + g * V::N));
+            let Memory { apart, rest, .. } = &mut *self.memory;
+            let left = if bundle.shared == Shared::Along { rest } else { apart };
+            left.extend(listing::groups(groups).map(|g| bundle.first + g * V::N));
             return true;
         }
         let next = Next::of(self.rays, bundle.first + bundle.len * V::N);

@@ -9,6 +9,7 @@
 
 use super::frame::Frame;
 use super::groups::Groups;
+use super::parallel::Parallel;
 use super::spans::{Spans, groups_of};
 use super::starts::Room;
 use super::{HALF_ULP, SET, V};
@@ -52,6 +53,10 @@ pub struct Planes {
     depth_margin: f32,
     /// Boxes that end before this depth are not met.
     front: f32,
+    /// Where the edges' planes are, if not through the apex: by axis and edge.
+    offset: [[f32; 2]; 2],
+    /// Rays of one direction: the height of the apex ([`super::parallel`]).
+    height: Option<f32>,
     apex: [f32; 3],
     /// Where segments are, if that is known in the space of the boxes.
     pub room: Option<Room>,
@@ -108,10 +113,16 @@ impl Planes {
             depth_size: a.map(|x| (0.5 * x).abs()),
             depth_margin: 0.0,
             front: groups.front,
+            offset: [[0.0; 2]; 2],
+            height: None,
             apex: frame.apex,
             room: None,
             spans: Spans::of::<N>(groups, frame, margin),
         };
+        if let Some(parallel) = &frame.parallel {
+            planes.set_parallel(parallel, groups, frame, margin);
+            return planes;
+        }
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
         for (axis, across) in [u, v].into_iter().enumerate() {
             let normal = groups.bounds[axis].map(|edge| each(|x| across[x] - edge * a[x]));
@@ -123,6 +134,21 @@ impl Planes {
         }
         planes.depth_margin = margin * sum(a) + groups.slack * 2.0;
         planes
+    }
+
+    /// The same for rays of one direction.
+    #[inline(always)]
+    fn set_parallel(&mut self, parallel: &Parallel, groups: &Groups, frame: &Frame, margin: f32) {
+        let [u, v, a] = frame.axes;
+        let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
+        for (axis, across) in [u, v].into_iter().enumerate() {
+            self.normal[axis] = [across.map(|x| 0.5 * x); 2];
+            self.size[axis] = [across.map(|x| (0.5 * x).abs()); 2];
+            self.offset[axis] = groups.bounds[axis];
+            self.margin[axis] = [margin * 2.0 * sum(across) + groups.slack * 2.0; 2];
+        }
+        self.depth_margin = margin * 2.0 * sum(a) + groups.slack * 2.0;
+        self.height = Some(parallel.height);
     }
 
     /// Tests the children of `node` against those of a tile's `N` sets of groups that met it; returns the children that some group
@@ -142,9 +168,9 @@ impl Planes {
         let side = |side: usize| each(|a| Children::load(&node.bounds[a][side]) - splat(self.apex[a]));
         let (lo, hi): ([Children; 3], [Children; 3]) = (side(0), side(1));
         let (sum, size): ([Children; 3], [Children; 3]) = (each(|a| hi[a] + lo[a]), each(|a| hi[a] - lo[a]));
-        let middle = |n: [f32; 3]| {
+        let middle = |n: [f32; 3], offset: f32| {
             let n = map3(n, splat);
-            n[0].mul_add(sum[0], n[1].mul_add(sum[1], n[2] * sum[2]))
+            n[0].mul_add(sum[0], n[1].mul_add(sum[1], n[2].mul_add(sum[2], splat(-offset))))
         };
         let radius = |n: [f32; 3], e: f32| {
             let n = map3(n, splat);
@@ -152,17 +178,21 @@ impl Planes {
         };
         // Of the planes of either family along an axis, as they are at one of the tile's edges.
         let planes = |axis: usize, edge: usize| {
-            let m = middle(self.normal[axis][edge]);
+            let m = middle(self.normal[axis][edge], self.offset[axis][edge]);
             let r = radius(self.size[axis][edge], self.margin[axis][edge]);
             (r + m, r - m)
         };
         let ((left_low, right_low), (left_high, right_high)) = (planes(0, 0), planes(0, 1));
         let ((below_low, above_low), (below_high, above_high)) = (planes(1, 0), planes(1, 1));
-        let (mz, rz) = (middle(self.depth), radius(self.depth_size, self.depth_margin));
+        let (mz, rz) = (middle(self.depth, 0.0), radius(self.depth_size, self.depth_margin));
         // Left of the tile's left edge or right of its right edge, all of the box.
         let least = left_low.fast_min(below_low).fast_min(right_high.fast_min(above_high));
-        let near = mz - rz;
-        let outside = least.cmp_lt(zero) | (mz + rz).cmp_lt(splat(self.front)) | splat(tile.farthest).cmp_lt(near);
+        // Heights grow towards where the tile is seen from, and their reciprocals are depths.
+        let (near, far) = match self.height {
+            None => (mz - rz, mz + rz),
+            Some(height) => (splat(1.0) / (mz + rz + splat(height)), splat(f32::INFINITY)),
+        };
+        let outside = least.cmp_lt(zero) | far.cmp_lt(splat(self.front)) | splat(tile.farthest).cmp_lt(near);
         let mut met = !outside.bits() & ((1u32 << node.used.min(WIDTH as u32)) - 1);
         if let Some(room) = &self.room {
             // As far as the same differences tell: rounding keeps their order.

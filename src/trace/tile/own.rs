@@ -113,7 +113,8 @@ pub fn pair_doubtful<const ANY: bool, const MANY: bool>(
         groups.ahead[g] = select(hit, plane.share(ahead), groups.ahead[g]);
     }
     id.name::<MANY>(groups, g, hit);
-    let weights = [0, 1].map(|k| select(keeps, edges.weights[k], weights[k] * inverse));
+    let unit = groups.unit(inverse);
+    let weights = [0, 1].map(|k| select(keeps, edges.weights[k], weights[k] * unit));
     keep(groups, g, hit, inverse, weights);
     hit.any()
 }
@@ -230,18 +231,24 @@ pub fn decide<const ANY: bool, const MANY: bool>(
             any |= occlude(groups, g, hit);
             return;
         }
-        let way = groups.way(g, found.t);
-        let inverse = (groups.of[g].slowness / way).fast_min(V::splat(f32::MAX));
+        let (inverse, share) = match &groups.frame.parallel {
+            Some(parallel) => (parallel.height_at(groups.behind[g], found.t), found.t - packet.t_min),
+            None => {
+                let way = groups.way(g, found.t);
+                ((groups.of[g].slowness / way).fast_min(V::splat(f32::MAX)), found.t / way)
+            }
+        };
+        let unit = groups.unit(inverse);
         let best = groups.of[g].inv_lo;
         let tie = best.cmp_eq(inverse) & id.is_not_after::<MANY>(groups, g);
         let wins = hit & (best.cmp_lt(inverse) | tie);
         groups.of[g].inv_lo = select(wins, inverse, best);
         if groups.is_behind {
-            groups.ahead[g] = select(wins, found.t / way, groups.ahead[g]);
+            groups.ahead[g] = select(wins, share, groups.ahead[g]);
         }
         id.name::<MANY>(groups, g, wins);
         for (weight, x) in groups.of[g].weights.iter_mut().zip([found.u, found.v]) {
-            *weight = select(wins, x * inverse, *weight);
+            *weight = select(wins, x * unit, *weight);
         }
         any |= wins.any();
     });
@@ -253,11 +260,19 @@ impl Groups {
     #[inline(always)]
     fn own_numbers(&self, g: usize, bundle: &Bundle) -> (Mask, V, V, V) {
         let found = Mask::from_bits(!positions(&self.of[g].slot, NO_SLOT));
-        let depth = V::constant(1.0) / self.of[g].inv_lo;
-        let mut t = depth * self.of[g].slowness;
-        if self.is_behind {
-            t *= self.ahead[g];
-        }
+        let (depth, t) = match &self.frame.parallel {
+            Some(parallel) => {
+                let start = bundle.ends(g)[0];
+                let t = parallel.between(start + self.ahead[g], self.behind[g], self.of[g].inv_lo);
+                (V::constant(1.0), t.fast_max(start))
+            }
+            None => {
+                let depth = V::constant(1.0) / self.of[g].inv_lo;
+                let t = depth * self.of[g].slowness;
+                (depth, if self.is_behind { t * self.ahead[g] } else { t })
+            }
+        };
+        let mut t = t;
         if !self.endless {
             let [t_min, t_max] = bundle.ends(g);
             t = t_min.fast_max(t_max.fast_min(t));

@@ -68,7 +68,7 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     let Memory { groups, batch, planes, listing, .. } = memory;
     let seen = batch.set_up::<ANY, EXACT>(groups, planes);
     listing.fill::<N, EXACT>(seen, &batch.groups, groups, planes);
-    let to_end = ANY && matches!(exact.bundle.shared, Shared::End(_));
+    let to_end = ANY && matches!(exact.bundle.shared, Shared::End(_) | Shared::Against);
     let is_behind = !ANY && groups.is_behind;
     let Tested { found, groups: changed } = match (EXACT, is_behind) {
         (true, true) => test_exact::<ANY, true, COUNT>(memory, exact, counters),

@@ -15,6 +15,8 @@ pub enum First<'a> {
     Shared(Bundle<'a>),
     /// They have none, and so neither have those of the block or of a set of it, most probably.
     Scattered,
+    /// They have none, but one direction.
+    Parallel,
     /// Nothing for all: some are for the packet kernel.
     Mixed,
     /// There is no such group.
@@ -38,7 +40,7 @@ impl<'a> First<'a> {
                 continue;
             }
             if tame != 0 && !group.share(rays, any) {
-                return Self::Scattered;
+                return if group.is_of_one_direction(rays) { Self::Parallel } else { Self::Scattered };
             }
             if odd != 0 {
                 return Self::Mixed;

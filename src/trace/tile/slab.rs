@@ -109,17 +109,20 @@ impl Slabs {
         bounds: &Aabb<f32>,
         wanted: u64,
     ) -> u64 {
-        let slopes = &mut self.slopes[usize::from(space.to_local.is_some())];
-        slopes.prepare(groups, bundle, space, wanted & !slopes.ready);
         let lo = each(|a| bounds.lo[a] - space.apex[a] - space.margin);
         let hi = each(|a| bounds.hi[a] - space.apex[a] + space.margin);
-        let met = match spans.backwards() {
-            Some(backwards) => {
+        let slopes = &mut self.slopes[usize::from(space.to_local.is_some())];
+        if groups.frame.parallel.is_none() {
+            slopes.prepare(groups, bundle, space, wanted & !slopes.ready);
+        }
+        let met = match (&groups.frame.parallel, spans.backwards()) {
+            (Some(parallel), _) => parallel.met(groups, space.apex, [lo, hi], wanted),
+            (None, Some(backwards)) => {
                 let near = each(|a| if backwards[a] { hi[a] } else { lo[a] });
                 let far = each(|a| if backwards[a] { lo[a] } else { hi[a] });
                 slopes.met::<true>(groups, near, far, wanted)
             }
-            None => slopes.met::<false>(groups, lo, hi, wanted),
+            (None, None) => slopes.met::<false>(groups, lo, hi, wanted),
         };
         let (tested, culled) = (wanted.count_ones() as i32, (wanted & !met).count_ones() as i32);
         self.add(SAVED * culled - COST * (tested + 1));

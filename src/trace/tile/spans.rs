@@ -32,8 +32,11 @@ pub struct Spans {
     /// By axis and set: depth per unit of the near plane's distance, and the far plane's.
     near: [[f32; SETS]; 4],
     far: [[f32; SETS]; 4],
-    /// Per axis: infinite where nothing is said.
-    beyond: [f32; 3],
+    /// What is added to either: of rays of one direction where they are, else nothing; infinite where nothing is said.
+    before: [[f32; SETS]; 3],
+    beyond: [[f32; SETS]; 3],
+    /// Rays go from this depth on.
+    first: f32,
 }
 
 /// Depth per unit of the near plane's distance and the far plane's, for components of directions over some rectangles; and which of
@@ -68,12 +71,58 @@ impl Ends {
 }
 
 impl Spans {
+    /// Those of rays of one direction, which have another place each: a point at (s, t) is, at the depth z away from where the tile is
+    /// seen, `columns` times s, t and -z from the apex.
+    fn of_direction<const N: usize>(groups: &Groups, frame: &Frame, columns: [[f32; 3]; 3], margin: f32) -> Self {
+        let [u, v, a] = columns;
+        let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
+        let rounding = frame.axes.map(|n| 2.0 * margin * sum(n) + 2.0 * groups.slack);
+        let mut spans = Self {
+            backwards: each(|x| a[x] > 0.0),
+            margin: each(|x| (0..3).map(|k| columns[k][x].abs() * rounding[k]).sum::<f32>() + ROUNDING * frame.extent),
+            near: [[0.0; SETS]; 4],
+            far: [[0.0; SETS]; 4],
+            before: [[f32::NEG_INFINITY; SETS]; 3],
+            beyond: [[f32::INFINITY; SETS]; 3],
+            first: f32::NEG_INFINITY,
+        };
+        let ends: [[[f32; SETS]; 2]; 2] = groups.of_sets.map(|sides| {
+            sides.map(|side| {
+                let side = side.to_array();
+                std::array::from_fn(|q| side[q])
+            })
+        });
+        for axis in 0..3 {
+            let per_depth = -1.0 / a[axis];
+            // What lies across the direction but for this says nothing that the edges' planes do not.
+            if per_depth.is_nan() || per_depth.abs() > 1e4 * frame.scale {
+                continue;
+            }
+            for q in 0..N {
+                let [[s0, s1], [t0, t1]] = ends.map(|sides| sides.map(|side| side[q]));
+                let along =
+                    |x: f32, [low, high]: [f32; 2]| if x < 0.0 { [x * high, x * low] } else { [x * low, x * high] };
+                let (of_s, of_t) = (along(u[axis], [s0, s1]), along(v[axis], [t0, t1]));
+                let size = ROUNDING * groups.wide * (u[axis].abs() + v[axis].abs());
+                let (least, most) = (of_s[0] + of_t[0] - size, of_s[1] + of_t[1] + size);
+                // The nearer plane is the high one where directions are negative.
+                let (at_near, at_far) = if spans.backwards[axis] { (least, most) } else { (most, least) };
+                (spans.near[axis][q], spans.far[axis][q]) = (per_depth, per_depth);
+                (spans.before[axis][q], spans.beyond[axis][q]) = (-at_near * per_depth, -at_far * per_depth);
+            }
+        }
+        spans
+    }
+
     /// Those of the first `N` sets of a loaded tile. `frame` and `margin`: see [`super::node::Planes::of`].
     #[inline(always)]
     pub fn of<const N: usize>(groups: &Groups, frame: &Frame, margin: f32) -> Self {
         let axes = frame.axes.map(|axis| DVec3::from(axis.map(f64::from)));
         let to_space = DMat3::from_cols(axes[0], axes[1], axes[2]).transpose().inverse();
         let columns = [to_space.x_axis, to_space.y_axis, to_space.z_axis].map(|c| c.to_array().map(|x| x as f32));
+        if frame.parallel.is_some() {
+            return Self::of_direction::<N>(groups, frame, columns, margin);
+        }
         // Lane 4 * axis + set.
         let lanes = |x: [f32; 3]| V::new(std::array::from_fn(|i| if i / SETS < 3 { x[i / SETS] } else { 0.0 }));
         let Ends { near, far, forwards, backwards } = Ends::of(columns.map(lanes), groups.of_sets, groups.wide);
@@ -86,11 +135,12 @@ impl Spans {
         let margin = each(|x| (0..3).map(|k| columns[k][x].abs() * rounding[k]).sum::<f32>());
         let (near, far) = (bytemuck::cast(near.to_array()), bytemuck::cast(far.to_array()));
         let backwards: [bool; 3] = each(|axis| all(backwards, axis));
-        let mut spans = Self { backwards, margin, near, far, beyond: [0.0; 3] };
+        let mut spans =
+            Self { backwards, margin, near, far, before: [[0.0; SETS]; 3], beyond: [[0.0; SETS]; 3], first: 0.0 };
         let is_finite = columns.as_flattened().iter().all(|x| x.is_finite());
         for axis in (0..3).filter(|&axis| !(is_finite && (all(forwards, axis) || backwards[axis]))) {
             (spans.near[axis], spans.far[axis]) = ([0.0; SETS], [0.0; SETS]);
-            spans.beyond[axis] = f32::INFINITY;
+            spans.beyond[axis] = [f32::INFINITY; SETS];
         }
         spans
     }
@@ -98,7 +148,7 @@ impl Spans {
     /// Per axis, whether directions are negative; `None` if along some axis a part of them is.
     #[inline(always)]
     pub fn backwards(&self) -> Option<[bool; 3]> {
-        self.beyond.iter().all(|beyond| *beyond == 0.0).then_some(self.backwards)
+        self.beyond.iter().all(|beyond| *beyond == [0.0; SETS]).then_some(self.backwards)
     }
 
     /// Which of a node's boxes, as seen from the apex, the `N` sets may meet.
@@ -115,9 +165,9 @@ impl Spans {
         });
         let mut met = 0;
         for q in 0..N {
-            let enter = |a: usize| near[a] * splat(self.near[a][q]);
-            let leave = |a: usize| far[a].mul_add(splat(self.far[a][q]), splat(self.beyond[a]));
-            let enter = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(splat(0.0)));
+            let enter = |a: usize| near[a].mul_add(splat(self.near[a][q]), splat(self.before[a][q]));
+            let leave = |a: usize| far[a].mul_add(splat(self.far[a][q]), splat(self.beyond[a][q]));
+            let enter = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(splat(self.first)));
             let leave = leave(0).fast_min(leave(1)).fast_min(leave(2));
             met |= u64::from(!leave.cmp_lt(enter).bits() & 0xffff) << (SET * q);
         }

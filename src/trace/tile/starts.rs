@@ -85,6 +85,14 @@ impl Room {
         // Lines pass the common point by this, and may go the other way along an axis by as little.
         let slack = bundle.slack;
         Some(match bundle.shared {
+            Shared::Along | Shared::Against => {
+                // As far as rays go: to one side of their starts along each axis, or to none.
+                let dir = groups.frame.parallel.map_or([0.0; 3], |parallel| parallel.dir);
+                Self {
+                    lo: each(|a| if dir[a] < 0.0 { f32::NEG_INFINITY } else { lo[a] - slack }),
+                    hi: each(|a| if dir[a] > 0.0 { f32::INFINITY } else { hi[a] + slack }),
+                }
+            }
             Shared::Behind => Self {
                 lo: each(|a| if lo[a] > 4.0 * slack { lo[a] } else { f32::NEG_INFINITY }),
                 hi: each(|a| if hi[a] < -4.0 * slack { hi[a] } else { f32::INFINITY }),
