@@ -36,7 +36,7 @@ const BELOW: f32 = 0.25;
 const ROUNDING: f32 = 32.0 * HALF_ULP;
 
 /// A common direction, as a frame has it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Parallel {
     /// The direction of the rays as they are.
     pub dir: [f32; 3],
