@@ -335,13 +335,14 @@ mod tests {
     #[test]
     fn packets_without_a_test_have_no_share_of_lanes() {
         let (world, batches, _) = cornell();
-        let mut rays = Rays::new(2);
-        rays.set(0, [1e6; 3], [1.0; 3], 0.0, f32::INFINITY);
-        rays.set(1, batches[0].org(0), batches[0].dir(0), 0.0, f32::INFINITY);
+        let some = batches[0].len();
+        let mut rays = Rays::new(some + 1);
+        (0..some).for_each(|i| rays.set(i, batches[0].org(i), batches[0].dir(i), 0.0, f32::INFINITY));
+        rays.set(some, [1e6; 3], [1.0; 3], 0.0, f32::INFINITY);
         let scalar = engine::<f32>("scalar").unwrap();
-        let work = work(scalar, &world, &[rays], RayKind::Scatter, (2, 1), &COSTS, &|| false).unwrap();
+        let work = work(scalar, &world, &[rays], RayKind::Scatter, (some as u32 + 1, 1), &COSTS, &|| false).unwrap();
         let Spread { mean, p10, .. } = work.per_packet.prim_lanes;
-        assert_eq!((mean, p10, work.prim_lanes, work.packets), (100.0, 100.0, 100.0, 2));
+        assert_eq!((mean, p10, work.prim_lanes, work.packets), (100.0, 100.0, 100.0, some as u64 + 1));
     }
 
     #[test]

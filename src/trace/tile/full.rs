@@ -4,6 +4,7 @@
 use super::bundle::{At, Bundle, Shared, Source, TAME, largest, sum};
 use super::columns::{AHEAD, Columns};
 use super::groups::{Groups, NO_SLOT};
+use super::parallel::NEAR;
 use super::presumed::Look;
 use super::{SET, V};
 use crate::lanes::minima::quarters;
@@ -182,7 +183,7 @@ impl Groups {
         let (frame, asked, scale) = (self.frame, self.asked, V::splat(self.frame.scale));
         let parallel = frame.parallel?;
         let (dir, apex) = (parallel.dir.map(V::splat), bundle.apex.map(V::splat));
-        let (mut sure, mut reach) = (Sure::new(), V::constant(0.0));
+        let (mut sure, mut reach, mut nearest) = (Sure::new(), V::constant(0.0), infinite);
         for q in 0..N {
             for i in 0..SET {
                 let g = q * SET + i;
@@ -191,6 +192,7 @@ impl Groups {
                 let [x, y, z] = each(|a| group.dir[a] ^ dir[a]);
                 sure.other = sure.other | x | y | z | group.t_min | (group.t_max ^ infinite);
                 sure.total += sum(group.org);
+                nearest = nearest.fast_min(largest(group.org));
                 let way = each(|a| group.org[a] - apex[a]);
                 reach = largest(way).fast_max(reach);
                 let [s, t, above] = frame.coordinates(way);
@@ -207,7 +209,7 @@ impl Groups {
             self.look_far(q);
         }
         let total: f32 = sure.total.to_array().iter().sum();
-        (total <= TAME.1).then_some(reach)
+        (total <= TAME.1 && NEAR * frame.extent <= least(nearest)).then_some(reach)
     }
 
     /// Puts the rays of group `g` in their place, which look as far as `inv_lo`.

@@ -20,7 +20,7 @@ use super::frame::{Frame, normalised, reach, sides};
 use super::groups::{Group, Groups};
 use super::lines::Lines;
 use super::{GROUPS, HALF_ULP, Job, Mask, SET, SETS, V, select};
-use crate::lanes::words::greatest;
+use crate::lanes::words::{greatest, least};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
 use crate::math::Aabb;
 use crate::ray::Rays;
@@ -28,6 +28,10 @@ use crate::ray::Rays;
 /// Rays may start up to this many times the scene's size away from where they pass its middle: what their places across the direction
 /// round to grows with that, the bound that answers keep does not.
 pub const FAR: f32 = 16.0;
+
+/// Rays must start at a coordinate of at least this part of the scene's size: heights, and places across the direction, are as fine
+/// as what is as large as the scene, whereas the common formula is finer for rays that start near zero.
+pub const NEAR: f32 = 1.0 / 16.0;
 
 /// Heights start this far below the scene, in parts of its size.
 const BELOW: f32 = 0.25;
@@ -226,7 +230,7 @@ impl<'a> Bundle<'a> {
         let starts: Vec<_> = std::iter::once(leader).chain(live.step_by(4)).map(|g| rays.org(ray(g))).collect();
         bundle.set_middle(starts.into_iter(), dir, bounds)?;
         bundle.shared = if any { Shared::Against } else { Shared::Along };
-        let (mut fits, mut farthest) = (true, V::constant(0.0));
+        let (mut fits, mut farthest, mut nearest) = (true, V::constant(0.0), V::splat(f32::INFINITY));
         for g in (0..bundle.len).filter(|&g| bundle.tame[g] | bundle.odd[g] != 0) {
             let at = first + g * V::N;
             let (org, t_max) = (load3(&rays.org, at), V::load(&rays.t_max[at..]));
@@ -234,11 +238,13 @@ impl<'a> Bundle<'a> {
             let end = t_max.mul_add(V::splat(square as f32), dot(org, dir.map(V::splat)));
             fits &= bundle.odd[g] == 0 && lanes & !(same(rays, at, dir) & exit.cmp_le(end).bits()) == 0;
             let way = largest(each(|a| org[a] - V::splat(bundle.apex[a])));
-            farthest = select(Mask::from_bits(lanes), way.fast_max(farthest), farthest);
+            let tame = Mask::from_bits(lanes);
+            farthest = select(tame, way.fast_max(farthest), farthest);
+            nearest = select(tame, largest(org).fast_min(nearest), nearest);
         }
-        let farthest = greatest(farthest);
+        let (farthest, extent) = (greatest(farthest), reach(bounds, bundle.apex));
         bundle.slack = 8.0 * HALF_ULP * farthest;
-        (fits && farthest <= FAR * reach(bounds, bundle.apex)).then_some(bundle)
+        (fits && farthest <= FAR * extent && NEAR * extent <= least(nearest)).then_some(bundle)
     }
 }
 
