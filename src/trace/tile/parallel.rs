@@ -82,15 +82,16 @@ impl Parallel {
         let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
         // What does not move along an axis is between its planes always or never.
         let per_axis = self.dir.map(|x| if x == 0.0 { f32::MAX } else { (1.0 / x).clamp(-f32::MAX, f32::MAX) });
-        let [near, far] = [[lo, hi], [hi, lo]]
-            .map(|[up, down]| each(|a| V::splat(apex[a] + if self.dir[a] < 0.0 { down[a] } else { up[a] })));
+        let [near, far] =
+            [[lo, hi], [hi, lo]].map(|[up, down]| each(|a| V::splat(if self.dir[a] < 0.0 { down[a] } else { up[a] })));
         let scale = V::splat(1.0 / groups.frame.scale);
         let (mut met, mut rest) = (0, wanted);
         while rest != 0 {
             let g = rest.trailing_zeros() as usize & (GROUPS - 1);
             rest &= rest - 1;
             let Group { start, inv_lo, .. } = &groups.of[g];
-            let start = each(|a| start[a] * scale);
+            // From the apex, too: far from the origin the boxes' margin would be rounded away.
+            let start = each(|a| start[a] * scale - V::splat(apex[a]));
             let enter = each(|a| (near[a] - start[a]) * V::splat(per_axis[a]));
             let leave = each(|a| (far[a] - start[a]) * V::splat(per_axis[a]));
             let enter = enter[0].fast_max(enter[1]).fast_max(enter[2].fast_max(zero));
