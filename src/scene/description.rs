@@ -59,7 +59,8 @@ pub struct Description {
     pub joins: bool,
     /// Precision this scene asks for (`None`: f32).
     pub precision: Option<Precision>,
-    /// Looks of a BRL-CAD database's regions, which only its own lighting model knows; object 0 has a part for each.
+    /// Looks of a BRL-CAD database's regions, which only its own lighting model knows; the object placed first has a part for
+    /// each.
     pub looks: Option<Arc<Looks>>,
     /// Numbers of the scene that `--set` changes, in the order they were written.
     pub parameters: Vec<Parameter>,

@@ -47,7 +47,7 @@ pub struct BareTriangles<S> {
 impl<S: Real> BareTriangles<S> {
     /// Those of `world`, which `rays` primary rays are to be traced through.
     pub fn new(world: &World<S>, looks: &Looks<'_>, rays: u64) -> Self {
-        let count = world.assembly.objects.first().map_or(0, |object| object.prim_count);
+        let count = world.first_placed().map_or(0, |(_, object)| object.prim_count);
         let is_one = world.is_single_object() && world.names.is_none();
         if !is_one || count > MAX_KEPT || 2 * u64::from(count) > rays {
             return Self { kept: Vec::new() };

@@ -173,7 +173,7 @@ impl<'a, S: Real> Shader<'a, S> {
     /// The same with the lighting model of [`Integrator::Rt`], seen by `camera`: of use for BRL-CAD databases only.
     #[must_use]
     pub fn with_rt(mut self, description: &Description, camera: &Camera) -> Self {
-        let object = self.world.assembly.objects.first();
+        let object = self.world.first_placed().map(|(_, object)| object);
         self.rt = description.looks.as_ref().map(|looks| Rt::new(looks, object, camera));
         self
     }

@@ -8,7 +8,7 @@ use lanecast::camera::Camera;
 use lanecast::film::{Film, PlaneData, Window};
 use lanecast::render::{Aov, RenderOptions, RenderOutput, Silent, render};
 use lanecast::scene::description::{
-    CameraDescription, Description, Item, ItemKind, Light, Material, Projection, Shape,
+    CameraDescription, Description, Group, Item, ItemKind, Light, Material, Projection, Shape,
 };
 use lanecast::scene::material::Scattering;
 use lanecast::scene::mesh::{Attribute, Mesh};
@@ -288,5 +288,43 @@ fn crops_are_windows_of_the_whole() {
     assert_eq!(crop.rays.primary, 27 * 18);
     for (x, y) in (7..25).flat_map(|y| (11..38).map(move |x| (x, y))) {
         assert_eq!(color(&crop.film, x, y), color(&whole.film, x, y));
+    }
+}
+
+/// A square that a group places, beside groups that nothing does, with more and with fewer primitives than the square.
+#[test]
+fn what_nothing_places_does_not_matter() {
+    let item = |kind| Item { transform: DAffine3::IDENTITY, material: None, kind };
+    let square = |size: f64| {
+        let positions = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| DVec3::new(x, y, 0.0) * size);
+        Arc::new(Mesh { positions: positions.into(), triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() })
+    };
+    let group = |items: Vec<Item>| Group { name: "some".into(), items };
+    let one = |kind| group(vec![item(kind)]);
+    let described = |unplaced: Vec<Group>| {
+        let placed = item(ItemKind::Instance(1 + unplaced.len() as u32));
+        let mut d = Description { meshes: vec![square(1.0), square(9.0)], ..Description::new("some") };
+        d.groups[0].items.push(placed);
+        d.lights.push(Light::Directional { direction: -DVec3::Z, irradiance: DVec3::splat(PI) });
+        d.groups.extend(unplaced.into_iter().chain([one(ItemKind::Mesh(0))]));
+        d
+    };
+    for integrator in [Integrator::Whitted, Integrator::Path, Integrator::Ao] {
+        let options = RenderOptions { integrator, ..options(8) };
+        let seen = |d: &Description| {
+            let film = picture::<f32>(d, &from_above(), &options).film;
+            let pixels: Vec<DVec3> = (0..64).map(|i| color(&film, i % 8, i / 8)).collect();
+            pixels
+        };
+        let alone = seen(&described(Vec::new()));
+        assert!(alone[27] != DVec3::ZERO && alone[0] == DVec3::ZERO, "{integrator:?}: {alone:?}");
+        for unplaced in [
+            vec![one(ItemKind::Shape(Shape::Sphere))],
+            vec![one(ItemKind::Mesh(1))],
+            vec![group((0..9).map(|_| item(ItemKind::Shape(Shape::Cuboid))).collect())],
+            vec![one(ItemKind::Mesh(1)), group(vec![item(ItemKind::Instance(1)), item(ItemKind::Shape(Shape::Disc))])],
+        ] {
+            assert_eq!(seen(&described(unplaced.clone())), alone, "{integrator:?}: {unplaced:?}");
+        }
     }
 }

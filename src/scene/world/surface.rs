@@ -6,7 +6,7 @@ use super::runs::{self, Place};
 use super::{World, solids, uv};
 use crate::lanes::Real;
 use crate::math::normal_to_world;
-use crate::scene::assembly::{Part, PartKind};
+use crate::scene::assembly::{AssemblyObject, Part, PartKind};
 use crate::scene::description::Shape;
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::Solid;
@@ -187,6 +187,13 @@ impl<S: Real> World<S> {
 }
 
 impl<S: Real> World<S> {
+    /// The object of the assembly's first placement, and its number: of a world that is one object, that one. It need not be the
+    /// assembly's first, which may be placed nowhere.
+    pub fn first_placed(&self) -> Option<(u32, &AssemblyObject)> {
+        let number = self.assembly.placements.first()?.object;
+        Some((number, self.assembly.objects.get(number as usize)?))
+    }
+
     /// First primitive, and the one after the last, of each run of primitives of `object` with one material.
     pub fn material_runs(&self, object: u32) -> impl Iterator<Item = (u32, u32)> {
         let runs = self.runs[object as usize].list();
@@ -302,4 +309,25 @@ pub(super) fn leaf_magnitude(part: &Part, leaf: &FlatLeaf) -> DVec3 {
 fn through(map: &DAffine3, magnitude: DVec3) -> DVec3 {
     let [x, y, z] = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis].map(DVec3::abs);
     x * magnitude.x + y * magnitude.y + z * magnitude.z + map.translation.abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::scene::assembly::{Assembly, Placement};
+    use crate::scene::description::Description;
+    use crate::scene::world::Preset;
+
+    /// Engines and shading must not rely on the assembly's order.
+    #[test]
+    fn the_object_placed_first_need_not_be_the_first() {
+        let mut world = World::<f32>::compile(&Description::new("nothing"), Preset::Fast).unwrap();
+        assert!(world.first_placed().is_none());
+        let object = |prim_count| AssemblyObject { prim_count, ..AssemblyObject::default() };
+        let placements = vec![Placement { object: 1, to_world: DAffine3::IDENTITY }];
+        world.assembly = Arc::new(Assembly { objects: vec![object(5), object(7)], placements });
+        assert_eq!(world.first_placed().map(|(number, object)| (number, object.prim_count)), Some((1, 7)));
+    }
 }

@@ -39,10 +39,11 @@ pub(super) fn uv<S: Real, V: Lanes<Scalar = S>>(
     position: Lanes3<V>,
     normal: Lanes3<V>,
 ) -> Option<[V; 2]> {
-    let part = &world.assembly.objects[0].parts[region as usize];
+    let (number, object) = world.first_placed()?;
+    let part = &object.parts[region as usize];
     let PartKind::Solids(tree) = &part.kind else { return None };
     match tree.leaves[(prim - part.first_prim) as usize].solid {
-        Solid::Shape(Shape::Sphere) => Some(uv_of_direction(world.place(0, prim)?.local_lanes(position))),
+        Solid::Shape(Shape::Sphere) => Some(uv_of_direction(world.place(number, prim)?.local_lanes(position))),
         Solid::Shape(Shape::HalfSpace) => Some(uv_of_plane(position, normal)),
         _ => None,
     }
