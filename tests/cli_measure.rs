@@ -285,6 +285,24 @@ fn dropped_triangles_are_in_no_instance() {
     assert_eq!(of, [Some(1), Some(3), Some(1)], "{counts}");
 }
 
+#[test]
+fn what_nothing_places_is_counted_nowhere() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let placed = "define \"hill\" { terrain size=4 }\ninstance \"hill\"\n";
+    std::fs::write(dir.path().join("one.kdl"), placed).expect("a scene");
+    let unplaced = "define \"hall\" { terrain size=16; sphere }\ndefine \"ball\" { sphere; instance \"hall\" }\n";
+    std::fs::write(dir.path().join("more.kdl"), format!("{unplaced}{placed}")).expect("a scene");
+    let counted = |scene: &str| {
+        let report = run(&dir, &format!("info {scene} --json")).json();
+        let counts =
+            ["objects", "instances", "primitives", "instanced_primitives"].map(|key| report["counts"][key].as_u64());
+        (counts, report["tree"].clone(), report["bytes"].clone())
+    };
+    assert_eq!(counted("more.kdl"), counted("one.kdl"));
+    let said = run(&dir, "explain more.kdl --engine scalar --size 16x16").out;
+    assert!(said.contains("32 primitives") && !said.contains("other primitives"), "{said}");
+}
+
 /// Two nodes with one mesh, a triangle, one of them turned on its side.
 const TWO_NODES: &str = r#"{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
     "nodes": [{"mesh": 0, "translation": [5, 0, 0]}, {"mesh": 0, "rotation": [0.6, 0, 0, 0.8]}],

@@ -1,6 +1,7 @@
 //! Lowering: the description's nested groups become numbered objects (geometry in one space) and a flat list of
 //! placements. This is where primitive and instance numbers are defined, once, for engines and oracle alike.
 //!
+//! * Only groups that are placed become objects: what is nowhere is to cost nothing, and to say nothing of what the world is made of.
 //! * Placement 0 is the root group's own geometry under the identity, if it has any; the others follow in the
 //!   order of a depth-first walk over the root's items.
 //! * Inside an object, primitive numbers count through its parts in the order they were written; every triangle
@@ -11,7 +12,7 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 
-use super::description::{Description, GroupId, ItemKind, MaterialId, Shape};
+use super::description::{Description, Group, GroupId, ItemKind, MaterialId, Shape};
 use super::mesh::Mesh;
 use super::solids::flat::{FlatTree, flatten};
 use crate::error::{Error, Result};
@@ -84,57 +85,21 @@ impl Placement {
 }
 
 impl Assembly {
-    /// Lowers `description`.
+    /// Lowers `description`: what its root group holds and places, however deep. Groups that nothing places are left out.
     ///
     /// # Errors
-    /// A group that contains itself, nesting deeper than [`MAX_NESTING`], more than [`MAX_PLACEMENTS`] placements,
-    /// more than 2^32 - 2 primitives in one object, an instance transform that cannot be inverted,
-    /// or a tree of solids that [`FlatTree::new`] refuses.
+    /// An item whose group, mesh, solids or material the description does not have, a group that contains itself, nesting
+    /// deeper than [`MAX_NESTING`], more than [`MAX_PLACEMENTS`] placements, more than 2^32 - 2 primitives in one object, an
+    /// instance transform that cannot be inverted, or a tree of solids that [`FlatTree::new`] refuses.
     pub fn new(description: &Description) -> Result<Self> {
         let file = description.source.clone().unwrap_or_else(|| format!("builtin:{}", description.name).into());
         let fail = |what: String| Error::whole(&file, what);
+        let is_placed = placed_groups(description).map_err(fail)?;
         let mut objects = Vec::new();
         let mut trees: Vec<Option<Arc<FlatTree>>> = vec![None; description.solids.len()];
         let mut object_of_group = vec![None; description.groups.len()];
-        for (g, group) in description.groups.iter().enumerate() {
-            let mut object = AssemblyObject { name: group.name.clone(), ..Default::default() };
-            for item in &group.items {
-                let (kind, count) = match &item.kind {
-                    ItemKind::Instance(_) => continue,
-                    ItemKind::Shape(shape) => (PartKind::Shape(*shape), 1),
-                    ItemKind::Mesh(m) => {
-                        let mesh = description.meshes[*m as usize].clone();
-                        let count = mesh.triangles.len() as u64;
-                        (PartKind::Mesh(mesh), count)
-                    }
-                    ItemKind::Solids(t) => {
-                        let known = &mut trees[*t as usize];
-                        let tree = match known {
-                            Some(tree) => tree.clone(),
-                            None => {
-                                let source = &description.solids[*t as usize];
-                                let tree =
-                                    flatten(source).map_err(|e| fail(format!("solid `{}`: {e}", source.name)))?;
-                                known.insert(tree).clone()
-                            }
-                        };
-                        let count = tree.leaf_count() as u64;
-                        (PartKind::Solids(tree), count)
-                    }
-                };
-                let total = u64::from(object.prim_count) + count;
-                if total >= u64::from(u32::MAX) {
-                    return Err(fail(format!("group `{}` has more than 2^32 - 2 primitives", group.name)));
-                }
-                object.parts.push(Part {
-                    first_prim: object.prim_count,
-                    prim_count: count as u32,
-                    to_object: item.transform,
-                    material: item.material,
-                    kind,
-                });
-                object.prim_count = total as u32;
-            }
+        for (g, group) in description.groups.iter().enumerate().filter(|(g, _)| is_placed[*g]) {
+            let object = AssemblyObject::of(group, description, &mut trees).map_err(fail)?;
             if object.prim_count > 0 {
                 object_of_group[g] = Some(objects.len() as u32);
                 objects.push(object);
@@ -159,6 +124,91 @@ impl Assembly {
         let parts = &self.objects[object as usize].parts;
         let after = parts.partition_point(|p| p.first_prim <= prim);
         &parts[after - 1]
+    }
+}
+
+/// By group: whether the root group holds it, itself or through others.
+fn placed_groups(description: &Description) -> std::result::Result<Vec<bool>, String> {
+    let Description { groups, meshes, solids, materials, .. } = description;
+    if groups.is_empty() {
+        return Err("a description needs a root group".into());
+    }
+    let mut is_placed = vec![false; groups.len()];
+    is_placed[0] = true;
+    let mut waiting = vec![0];
+    while let Some(g) = waiting.pop() {
+        let group: &Group = &groups[g];
+        for item in &group.items {
+            let (what, number, count) = match item.kind {
+                ItemKind::Shape(_) => ("shape", 0, 1),
+                ItemKind::Mesh(m) => ("mesh", m, meshes.len()),
+                ItemKind::Solids(t) => ("tree of solids", t, solids.len()),
+                ItemKind::Instance(child) => ("group", child, groups.len()),
+            };
+            let material = item.material.map(|m| ("material", m, materials.len()));
+            for (what, number, count) in [Some((what, number, count)), material].into_iter().flatten() {
+                if number as usize >= count {
+                    return Err(format!(
+                        "group `{}` has an item of {what} {number}, but there are {count}",
+                        group.name
+                    ));
+                }
+            }
+            if let ItemKind::Instance(child) = item.kind
+                && !std::mem::replace(&mut is_placed[child as usize], true)
+            {
+                waiting.push(child as usize);
+            }
+        }
+    }
+    Ok(is_placed)
+}
+
+impl AssemblyObject {
+    /// The geometry of `group`. `trees`: those of the description's solids that are known.
+    fn of(
+        group: &Group,
+        description: &Description,
+        trees: &mut [Option<Arc<FlatTree>>],
+    ) -> std::result::Result<Self, String> {
+        let mut object = Self { name: group.name.clone(), ..Self::default() };
+        for item in &group.items {
+            let (kind, count) = match &item.kind {
+                ItemKind::Instance(_) => continue,
+                ItemKind::Shape(shape) => (PartKind::Shape(*shape), 1),
+                ItemKind::Mesh(m) => {
+                    let mesh = description.meshes[*m as usize].clone();
+                    let count = mesh.triangles.len() as u64;
+                    (PartKind::Mesh(mesh), count)
+                }
+                ItemKind::Solids(t) => {
+                    let known = &mut trees[*t as usize];
+                    let tree = match known {
+                        Some(tree) => tree.clone(),
+                        None => {
+                            let source = &description.solids[*t as usize];
+                            let tree = flatten(source).map_err(|e| format!("solid `{}`: {e}", source.name))?;
+                            known.insert(tree).clone()
+                        }
+                    };
+                    let count = tree.leaf_count() as u64;
+                    (PartKind::Solids(tree), count)
+                }
+            };
+            let total = u64::from(object.prim_count) + count;
+            if total >= u64::from(u32::MAX) {
+                return Err(format!("group `{}` has more than 2^32 - 2 primitives", group.name));
+            }
+            object.parts.push(Part {
+                first_prim: object.prim_count,
+                prim_count: count as u32,
+                to_object: item.transform,
+                material: item.material,
+                kind,
+            });
+            object.prim_count = total as u32;
+        }
+        Ok(object)
     }
 }
 
@@ -250,7 +300,7 @@ impl Walk<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::description::{Group, Item};
+    use crate::scene::description::Item;
 
     /// Groups in a row, each of which holds `copies` instances of the next; the last holds a sphere, if `has_sphere`.
     fn chain(groups: u32, copies: usize, has_sphere: bool) -> Description {
@@ -285,5 +335,48 @@ mod tests {
         let back = circle.groups[0].items[0].clone();
         circle.groups[2].items.push(back);
         assert!(made(&circle).unwrap_err().contains("contains an instance of itself"));
+    }
+
+    #[test]
+    fn only_what_is_placed_becomes_an_object() {
+        let item = |kind| Item { transform: DAffine3::IDENTITY, material: None, kind };
+        let group = |name: &str, kinds: &[ItemKind]| Group {
+            name: name.into(),
+            items: kinds.iter().cloned().map(item).collect(),
+        };
+        let mut d = Description::new("some");
+        let sphere = ItemKind::Shape(Shape::Sphere);
+        d.groups.extend([
+            group("nowhere", &[sphere.clone(), ItemKind::Instance(2)]),
+            group("inner", &[sphere.clone(), sphere.clone()]),
+            group("lost", &[sphere.clone(), ItemKind::Instance(1)]),
+            group("outer", &[sphere, ItemKind::Instance(2), ItemKind::Instance(2)]),
+        ]);
+        assert_eq!(Assembly::new(&d).unwrap().objects.len(), 0);
+        d.groups[0].items.push(item(ItemKind::Instance(4)));
+        let made = Assembly::new(&d).unwrap();
+        let objects: Vec<_> = made.objects.iter().map(|o| (o.name.as_str(), o.prim_count)).collect();
+        assert_eq!(objects, [("inner", 2), ("outer", 1)]);
+        assert_eq!(made.placements.iter().map(|p| p.object).collect::<Vec<_>>(), [1, 0, 0]);
+    }
+
+    #[test]
+    fn items_of_what_is_not_there_are_refused() {
+        let refusal = |kind, material| {
+            let mut d = Description::new("some");
+            d.groups[0].items.push(Item { transform: DAffine3::IDENTITY, material, kind });
+            Assembly::new(&d).unwrap_err().to_string()
+        };
+        for (kind, material, what) in [
+            (ItemKind::Mesh(0), None, "mesh 0, but there are 0"),
+            (ItemKind::Solids(2), None, "tree of solids 2, but there are 0"),
+            (ItemKind::Instance(1), None, "group 1, but there are 1"),
+            (ItemKind::Shape(Shape::Disc), Some(1), "material 1, but there are 1"),
+        ] {
+            let text = refusal(kind, material);
+            assert!(text.contains(what), "{text}");
+        }
+        let none = Description { groups: Vec::new(), ..Description::new("none") };
+        assert!(Assembly::new(&none).is_err());
     }
 }
