@@ -41,6 +41,23 @@ fn pictures() -> tempfile::TempDir {
 }
 
 #[test]
+fn mirrors_leave_the_rest_to_the_base() {
+    let folder = pictures();
+    let of = |text: &str| {
+        let scene = read_in(Some(folder.path()), &format!("material \"m\" {{ {text} }}")).unwrap();
+        (scene.materials[1].diffuse.to_array(), scene.materials[1].mirror.to_array())
+    };
+    assert_eq!(of("mirror 0.875"), ([0.125; 3], [0.875; 3]));
+    assert_eq!(of("mirror 0 0.25 0.5"), ([0.7, 0.7, 0.5], [0.0, 0.25, 0.5]));
+    assert_eq!(of("mirror 0.25; texture \"a.png\"").0, [0.75; 3]);
+    assert_eq!(of("texture \"a.png\"").0, [1.0; 3]);
+    assert_eq!(of("diffuse 0.7; mirror 0.3"), ([0.7; 3], [0.3; 3]));
+    // Models have no use for a mirror besides their own.
+    assert_eq!(of("diffuse 0.9; mirror 0.9; plastic").0, [0.9; 3]);
+    assert_eq!(of("mirror 0.9; plastic").0, [0.7; 3]);
+}
+
+#[test]
 fn models_of_scattering() {
     assert_eq!(scattering("diffuse 0.5; mirror 0.1"), Scattering::Matte);
     let tint = DVec3::new(0.5, 1.0, 0.25);
@@ -207,6 +224,7 @@ fn what_is_wrong_is_said_where_it_stands() {
         ("material \"a\" { conductor }", "1:16", "expected a metal (`conductor gold`), or both `eta` and `k`"),
         ("material \"a\" { conductor gold k=1 }", "1:16", "or both `eta` and `k`"),
         ("material \"a\" { conductor eta=0 k=1 }", "1:26", "`eta` must be above zero"),
+        ("material \"a\" { diffuse 0.5; mirror 0.2 0.6 0.1 }", "1:16", "`diffuse` and `mirror` add up to 1.1: "),
         ("material \"a\" { plastic; dielectric }", "1:25", "this one has `plastic`"),
         ("material \"a\" { plastik }", "1:16", "did you mean `plastic`?"),
         ("material \"a\" { plastic roughness=2 }", "1:24", "`roughness` takes a number from 0 to 1, found 2"),

@@ -37,7 +37,7 @@ pub struct Mix<'n> {
 /// mixes.
 ///
 /// # Errors
-/// Fields that do not fit, reflectances above 1, several models, files that cannot be used.
+/// Fields that do not fit, reflectances above 1 (also of `diffuse` and `mirror` together), several models, files that cannot be used.
 pub fn material<'n, 'a>(
     scope: &Scope<'a>,
     node: &'n Node<'a>,
@@ -71,8 +71,8 @@ pub fn material<'n, 'a>(
     // A texture multiplies its number: alone, it should be seen as it is.
     let unless = |textured: Option<TextureRef>, plain: DVec3| if textured.is_some() { DVec3::ONE } else { plain };
     let (base, glow) = (material.textures.base, material.textures.emission);
-    material.diffuse = fields.colour("diffuse", 1.0)?.unwrap_or(unless(base, material.diffuse));
-    material.mirror = fields.colour("mirror", 1.0)?.unwrap_or(material.mirror);
+    let plain = unless(base, material.diffuse);
+    (material.diffuse, material.mirror) = reflectances(&fields, plain, model.is_none())?;
     material.emission = fields.colour("emission", f64::INFINITY)?.unwrap_or(unless(glow, material.emission));
     material.one_sided = fields.flag("one-sided")?;
     material.opacity = fields.share("opacity", 1.0)?;
@@ -82,6 +82,24 @@ pub fn material<'n, 'a>(
         false => Alpha::Opaque,
     };
     Ok((material, mix))
+}
+
+/// `diffuse`, which is `plain` if it is not given, and `mirror`. What `is_matte` reflects both ways; of light that is mirrored the
+/// base gets nothing.
+fn reflectances(fields: &Fields<'_, '_, '_>, plain: DVec3, is_matte: bool) -> Result<(DVec3, DVec3)> {
+    let mirror = fields.colour("mirror", 1.0)?.unwrap_or(DVec3::ZERO);
+    let Some(diffuse) = fields.colour("diffuse", 1.0)? else {
+        return Ok((if is_matte { plain.min(DVec3::ONE - mirror) } else { plain }, mirror));
+    };
+    let most = (diffuse + mirror).max_element();
+    // Numbers like 0.7 and 0.3 need not add up to 1 exactly.
+    if is_matte && most > 1.0 + 1e-9 {
+        let what = format!("`diffuse` and `mirror` add up to {most}: a surface reflects at most 1 of any colour");
+        return Err(fields
+            .error_at("diffuse", what)
+            .with_help("without `diffuse` it is what `mirror` leaves, at most 0.7"));
+    }
+    Ok((diffuse, mirror))
 }
 
 /// How `node` of `kind` scatters, and whether facets throw light at each other.
