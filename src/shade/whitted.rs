@@ -69,12 +69,16 @@ impl<S: Real> Shader<'_, S> {
             for light in &self.lights {
                 self.add_light(light, &here, shadows, work, out);
             }
-            if level < self.settings.depth {
-                branch(&here, next, work);
+            let [mirrored, refracted] = if level < self.settings.depth {
+                branch(&here, next)
             } else {
                 next.open(0);
-            }
+                [0; 2]
+            };
             work.lap(level);
+            // They are traced in the next level, and count there.
+            work.rays.mirror += mirrored;
+            work.rays.refracted += refracted;
             std::mem::swap(now, next);
             if now.len() == 0 {
                 break;
@@ -153,8 +157,8 @@ impl<S: Real> Shader<'_, S> {
     }
 }
 
-/// The mirrored and refracted rays of `level` that carry enough light into `next`, all mirrored ones first.
-fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Workspace<S>) {
+/// The mirrored and refracted rays of `level` that carry enough light into `next`, all mirrored ones first, and how many of each there are.
+fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>) -> [u64; 2] {
     let Level { rays, carried, vertices } = level;
     let bright = |light: Lanes3<S::Wide>| {
         S::Wide::constant(CUT_OFF).cmp_le(light[0].fast_max(light[1]).fast_max(light[2])).bits()
@@ -188,8 +192,7 @@ fn branch<S: Real>(level: &Level<'_, S>, next: &mut Branches<S>, work: &mut Work
     }
     next.close();
     let mirrored = next.rays.live_among(count_mirrored);
-    work.rays.mirror += mirrored as u64;
-    work.rays.refracted += (next.rays.live_count() - mirrored) as u64;
+    [mirrored, next.rays.live_count() - mirrored].map(|count| count as u64)
 }
 
 /// Directions `dir` refracted at surfaces with unit normals `normal` and shading normals `shading`, and the lanes without

@@ -179,6 +179,11 @@ fn two_mirrors_multiply_and_depth_counts_them() {
     let geometric = |m: f64| 1.0 + m + m * m + m * m * m;
     close(color(&output.film, 0, 0), DVec3::new(geometric(0.9), geometric(0.8), geometric(0.7)));
     assert_eq!(output.rays.mirror, 3);
+    assert_eq!(
+        output.paths.bounces.iter().map(|level| level.rays).collect::<Vec<_>>(),
+        [1; 4],
+        "one ray in each level"
+    );
 }
 
 /// The share that glass of index 1.5 mirrors of light under `angle` to its normal.
