@@ -263,6 +263,22 @@ fn info_counts_and_measures() {
     assert!(text.contains("primitives") && text.contains("SAH cost"), "{text}");
 }
 
+/// Engines get as many rays at a time for a picture of costs as they trace together.
+#[test]
+fn pictures_of_costs_show_what_explain_counts() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let (same, engines) = ("builtin:cornell --size 64x64", ["scalar", "packet16", "stream", "tile"]);
+    let report = run(&dir, &format!("explain {same} --rays primary --engine {} --json", engines.join(","))).json();
+    for (i, engine) in engines.iter().enumerate() {
+        run(&dir, &format!("render {same} --engine {engine} --aov cost.nodes -o {engine}.exr"));
+        let film = lanecast::film::exr::read(&dir.path().join(format!("{engine}.exr"))).expect("an EXR");
+        let nodes = film.f32_plane("cost.nodes").expect("a plane");
+        let mean = nodes.iter().map(|&n| f64::from(n)).sum::<f64>() / nodes.len() as f64;
+        let want = report["classes"][0]["engines"][i]["nodes_per_ray"].as_f64().expect("a number");
+        assert!((mean / want - 1.0).abs() < 0.02, "{engine}: {mean}, explain says {want}");
+    }
+}
+
 /// Rays that start on surfaces, where there is none.
 #[test]
 fn explain_of_nothing_speaks_of_no_primitives() {

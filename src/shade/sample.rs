@@ -36,7 +36,8 @@ pub struct FirstHit {
     /// Primitive number.
     pub prim: u32,
     /// Node visits per ray, if counted: packets share visits, so this is the number of visits that the engine made
-    /// for the 4 x 4 block of rays around this one, divided by the block's live rays. Depends on the engine.
+    /// for the block of rays around this one, divided by the block's live rays. A block is as many rays as the engine traces
+    /// together ([`crate::trace::Engine::lanes`]), 4 x 4 at least and a tile of the picture at most.
     pub nodes: f64,
 }
 

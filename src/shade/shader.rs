@@ -27,7 +27,7 @@ use crate::scene::light::Environment;
 use crate::scene::world::World;
 use crate::trace::{Engine, Scratch};
 
-/// Rays of one cost measurement: in Morton order 16 consecutive rays are a block of 4 x 4 pixels.
+/// Fewest rays of one cost measurement: in Morton order 16 consecutive rays are a block of 4 x 4 pixels.
 const COST_BLOCK: usize = 16;
 
 /// Samples of a tile whose paths are traced together, at most: the fastest of 1, 2, 4 and 8 (results/NOTES.md).
@@ -311,12 +311,14 @@ impl<'a, S: Real> Shader<'a, S> {
         Rgba { radiance, alpha: f64::from(u8::from(is_shown)) }
     }
 
-    /// As [`Self::intersect`], 16 rays at a time with counting kernels, which gives each block of 4 x 4 pixels its
-    /// own number of node visits.
+    /// As [`Self::intersect`], with counting kernels and as many rays at a time as the engine traces together, 16 at least: each such
+    /// block of pixels gets its own number of node visits.
     fn trace_blocks(&self, rays: &Rays<S>, work: &mut Workspace<S>, out: &mut [FirstHit]) {
         work.hits.reset(rays.len());
-        for first in (0..rays.len()).step_by(COST_BLOCK) {
-            let count = COST_BLOCK.min(rays.len() - first);
+        // Fewer than it traces together would cost it more than they do in any picture.
+        let size = self.engine.lanes().max(COST_BLOCK);
+        for first in (0..rays.len()).step_by(size) {
+            let count = size.min(rays.len() - first);
             work.block.reset(count);
             for i in 0..count {
                 let j = first + i;

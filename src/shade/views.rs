@@ -35,7 +35,7 @@ fn show(out: &mut Samples, value: impl Fn(&FirstHit) -> DVec3) {
     }
 }
 
-/// Node visits as heat, also of misses, on a fixed logarithmic scale so that two pictures can be compared.
+/// Node visits as heat, also of misses, on a fixed logarithmic scale so that two pictures can be compared (docs/LIGHT.md).
 pub(super) fn cost(out: &mut Samples) {
     for (i, hit) in out.hits.iter().enumerate() {
         out.colors.set(i, Rgba { radiance: heat((1.0 + hit.nodes).log2() / HOTTEST_LOG2), alpha: 1.0 });

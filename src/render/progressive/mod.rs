@@ -7,7 +7,7 @@
 //! # Same bits
 //! With an exact engine ([`Engine::is_exact`]) a pixel's value depends on camera, pixel, sample and seed alone: the
 //! finished picture is that of [`super::render_with`] bit for bit. Where it depends on the neighbours in the batch too (an
-//! engine that is not exact, or costs, which are counted per 4 x 4 pixels) there are no coarse blocks: whole tiles come
+//! engine that is not exact, or costs, which are counted per block of pixels) there are no coarse blocks: whole tiles come
 //! first, the batches of the plain render, and the bits are the same again.
 
 mod framebuffer;
