@@ -22,6 +22,8 @@ fn help_teaches_by_example() {
             ended.out
         );
     }
+    let trace = lanecast(dir.path(), &["trace", "--help"]).out.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(trace.contains("the weights of the second and the third corner"), "{trace}");
     let top = lanecast(dir.path(), &["--help"]);
     assert_eq!(top.code, Some(0));
     for command in COMMANDS {

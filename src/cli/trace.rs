@@ -32,6 +32,10 @@ Examples:
   lanecast trace model.ply --rays primary.npy --hits hits.npy --repeat 1
 
 RAYS are NumPy little-endian f4 of shape (N, 8): ox oy oz t_min dx dy dz t_max.
+HITS are a structured array of shape (N): t (f4) in lengths of the ray's direction, infinite where nothing is hit; u \
+and v (f4), on triangles the weights of the second and the third corner, on shapes and solids the number of the face, \
+and 1 where a solid was subtracted, else 0; prim (u4), the number of the primitive in its object, and inst (u4), that \
+of the instance, both in the order of the scene, 4294967295 where nothing is hit.
 The hits are compared with the scalar engine's before the clock starts: bit for bit, or, for the engine tile, up to \
 what the f64 oracle explains by rounding.";
 

@@ -175,11 +175,13 @@ pub struct Hits<S> {
     len: usize,
     /// Ray parameter.
     pub t: Column<S>,
-    /// Triangles: weight of the second corner. Analytic shapes: number of the face that was hit (see `shape`).
+    /// Triangles: weight of the second corner. Analytic shapes and leaves of trees of solids: number of the face that was hit (see
+    /// [`crate::shape`]).
     pub u: Column<S>,
-    /// Triangles: weight of the third corner. Analytic shapes: 0.
+    /// Triangles: weight of the third corner. Analytic shapes: 0. Leaves of trees of solids: 1 where the leaf's outside is
+    /// inside the whole, as where it was subtracted, else 0.
     pub v: Column<S>,
-    /// Primitive number inside the instance's object.
+    /// Primitive number inside the instance's object; of a tree of solids, that of the leaf whose surface was hit.
     pub prim: Column<u32>,
     /// Instance number.
     pub inst: Column<u32>,

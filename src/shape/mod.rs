@@ -3,7 +3,8 @@
 //! One kind of primitive is one file. Triangles and world spheres keep their numbers in world (object) space; the
 //! other shapes are canonical solids in a local space, intersected by the inverse-transformed ray.
 //!
-//! Analytic shapes report the number of the face that was hit as `u` (and 0 as `v`):
+//! Analytic shapes and the leaves of trees of solids report the number of the face that was hit as `u`, and as `v` 0, or 1 where a
+//! leaf's outside is inside the whole, as where it was subtracted:
 //! sphere, half-space and disc 0; cuboid 0..=5 for -x, +x, -y, +y, -z, +z; cylinder and cone 0 for the side, 1 for
 //! the cap at z = 0, 2 for the cap at z = 1. The files of the solids that only trees of solids hold (polyhedra, tori,
 //! quadrics between slabs, tapered solids) number their own.
