@@ -1,6 +1,20 @@
 //! lanecast traces rays in SIMD lanes: coherent tiles of rays, packets of 4, 8 or 16 lanes, a flattened 8- and 16-wide BVH
 //! over structure-of-arrays primitives, HDR output, and a measuring bench that checks every hit before it is timed.
 //!
+//! # Building with it
+//! Widths are chosen when the crate is compiled, not when it runs: what the target's features allow is what the kernels use. The
+//! `.cargo/config.toml` of this repository asks for the machine's own (`target-cpu=native`), but cargo reads it for builds inside of
+//! the repository only, not for crates that depend on this one. Without such a line of their own they get the baseline of x86-64, SSE2:
+//! the same answers within rounding, but slower. Put into your crate's `.cargo/config.toml`:
+//!
+//! ```toml
+//! [build]
+//! rustflags = ["-C", "target-cpu=native"]
+//! ```
+//!
+//! or name a CPU that all machines have, such as `x86-64-v3`. [`lanes::compiled_isa`] says what a build uses. Trees and kernels also
+//! want optimisation: set `opt-level = 3` for this crate in profiles that you trace with.
+//!
 //! # The house
 //! Each floor uses only those below it; `tests/layers.rs` refuses an upward edge.
 //!

@@ -19,6 +19,20 @@ use crate::scene::description::{CameraDescription, Projection};
 
 /// A camera ready to make rays. All vectors are f64, world space; u, v, n are orthonormal, u points right, v up and
 /// n backwards (from the scene to the eye), so u x v = n.
+///
+/// The ray through the point (x, y) of a picture of w x h pixels, x to the right and y down, (0, 0) its upper left corner and (0.5, 0.5)
+/// the centre of the first pixel, crosses the view plane at
+///
+/// ```text
+/// a = half_width (2 x / w - 1),     b = half_height (1 - 2 y / h)
+///
+/// perspective: origin eye,               direction a u + b v - n
+/// parallel:    origin eye + a u + b v,   direction -n
+/// ```
+///
+/// The view plane of a perspective camera lies at distance 1 before the eye, half_height = tan(theta / 2), and directions are not
+/// unit: t is the distance along the viewing axis. That of a parallel camera goes through the eye, and t is the distance from it. Source:
+/// F. S. Hill, *Computer Graphics Using OpenGL*, ray tracing chapter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Eye point; for a parallel camera the point behind the centre of the picture where rays start.

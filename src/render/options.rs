@@ -24,7 +24,8 @@ pub struct RenderOptions {
     pub height: u32,
     /// Part of it to render (y down, half open); `None` is all.
     pub crop: Option<Window>,
-    /// Samples per pixel, at most: 1 goes through the centre (not of paths), more are spread over the pixel.
+    /// Samples per pixel, at most: 1 goes through the centre (not of paths), more are spread over the pixel. Unless told otherwise,
+    /// `lanecast render` takes 64 with [`Integrator::Path`] and 1 with others; the default here is 1.
     pub spp: u32,
     /// How samples are placed around the pixel's centre.
     pub filter: Filter,
@@ -41,7 +42,8 @@ pub struct RenderOptions {
     pub engine: String,
     /// Tile edge: 8, 16 or 32 pixels. With the generic engines it changes no bit of the picture.
     pub tile: u32,
-    /// Mirror reflections followed; scatterings of a path.
+    /// Levels of mirrored and refracted rays that are followed; scatterings of a path. Unless told otherwise, `lanecast render` takes
+    /// [`Integrator::depth`] of the integrator; the default here is that of the default integrator, which is little for paths.
     pub depth: u32,
     /// Occlusion rays per hit.
     pub ao_samples: u32,

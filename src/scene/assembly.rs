@@ -8,6 +8,7 @@
 //!   of a mesh takes a number, also one that will turn out degenerate. A tree of solids takes one for every leaf: a
 //!   hit's number says whose surface is seen, the part it belongs to says which tree.
 
+use std::mem::replace;
 use std::sync::Arc;
 
 use glam::DAffine3;
@@ -88,9 +89,10 @@ impl Assembly {
     /// Lowers `description`: what its root group holds and places, however deep. Groups that nothing places are left out.
     ///
     /// # Errors
-    /// An item whose group, mesh, solids or material the description does not have, a group that contains itself, nesting
-    /// deeper than [`MAX_NESTING`], more than [`MAX_PLACEMENTS`] placements, more than 2^32 - 2 primitives in one object, an
-    /// instance transform that cannot be inverted, or a tree of solids that [`FlatTree::new`] refuses.
+    /// An item whose group, mesh, solids or material the description does not have, a mesh that [`Mesh::check`] refuses, a
+    /// group that contains itself, nesting deeper than [`MAX_NESTING`], more than [`MAX_PLACEMENTS`] placements, more than
+    /// 2^32 - 2 primitives in one object, an instance transform that cannot be inverted, or a tree of solids that
+    /// [`FlatTree::new`] refuses.
     pub fn new(description: &Description) -> Result<Self> {
         let file = description.source.clone().unwrap_or_else(|| format!("builtin:{}", description.name).into());
         let fail = |what: String| Error::whole(&file, what);
@@ -133,7 +135,7 @@ fn placed_groups(description: &Description) -> std::result::Result<Vec<bool>, St
     if groups.is_empty() {
         return Err("a description needs a root group".into());
     }
-    let mut is_placed = vec![false; groups.len()];
+    let (mut is_placed, mut is_checked) = (vec![false; groups.len()], vec![false; meshes.len()]);
     is_placed[0] = true;
     let mut waiting = vec![0];
     while let Some(g) = waiting.pop() {
@@ -154,10 +156,14 @@ fn placed_groups(description: &Description) -> std::result::Result<Vec<bool>, St
                     ));
                 }
             }
-            if let ItemKind::Instance(child) = item.kind
-                && !std::mem::replace(&mut is_placed[child as usize], true)
-            {
-                waiting.push(child as usize);
+            match item.kind {
+                ItemKind::Instance(child) if !replace(&mut is_placed[child as usize], true) => {
+                    waiting.push(child as usize);
+                }
+                ItemKind::Mesh(m) if !replace(&mut is_checked[m as usize], true) => {
+                    meshes[m as usize].check().map_err(|what| format!("mesh {m}: {what}"))?;
+                }
+                _ => {}
             }
         }
     }
@@ -376,6 +382,11 @@ mod tests {
             let text = refusal(kind, material);
             assert!(text.contains(what), "{text}");
         }
+        let mut broken = Description::new("broken");
+        broken.meshes.push(Arc::new(Mesh { triangles: vec![[0; 3]], ..Mesh::default() }));
+        broken.groups[0].items.push(Item { transform: DAffine3::IDENTITY, material: None, kind: ItemKind::Mesh(0) });
+        let text = Assembly::new(&broken).unwrap_err().to_string();
+        assert!(text.contains("mesh 0: triangles name positions up to 0, but there are 0"), "{text}");
         let none = Description { groups: Vec::new(), ..Description::new("none") };
         assert!(Assembly::new(&none).is_err());
     }

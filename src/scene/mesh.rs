@@ -48,9 +48,25 @@ impl<T: Copy> Attribute<T> {
         Some(indices.map(|k| self.values[k as usize]))
     }
 
+    fn check(&self, what: &str, triangles: &[[u32; 3]]) -> Result<(), String> {
+        let by_vertex = triangles.get(self.indices.len()..).filter(|_| !self.values.is_empty());
+        in_range(what, self.values.len(), by_vertex.unwrap_or_default())?;
+        in_range(what, self.values.len(), if self.values.is_empty() { &[] } else { &self.indices })
+    }
+
     /// Bytes of values and indices.
     pub fn bytes(&self) -> u64 {
         (size_of_val(&self.values[..]) + size_of_val(&self.indices[..])) as u64
+    }
+}
+
+/// Whether all of `indices` are below `count`.
+fn in_range(what: &str, count: usize, indices: &[[u32; 3]]) -> Result<(), String> {
+    match indices.as_flattened().iter().max() {
+        Some(&most) if most as usize >= count => {
+            Err(format!("triangles name {what} up to {most}, but there are {count}"))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -68,6 +84,19 @@ pub struct MeshGroup {
 }
 
 impl Mesh {
+    /// Whether all indices name something that is there.
+    ///
+    /// # Errors
+    /// What does not.
+    pub fn check(&self) -> Result<(), String> {
+        let Self { positions, triangles, normals, uvs: [first, second], tangents, .. } = self;
+        in_range("positions", positions.len(), triangles)?;
+        normals.check("normals", triangles)?;
+        first.check("texture coordinates", triangles)?;
+        second.check("texture coordinates", triangles)?;
+        tangents.check("tangents", triangles)
+    }
+
     /// The three corners of triangle `i`.
     pub fn corners(&self, i: usize) -> [DVec3; 3] {
         self.triangles[i].map(|v| self.positions[v as usize])
@@ -111,5 +140,27 @@ impl Mesh {
             0.5 * (b - a).cross(c - a).length()
         };
         (0..self.triangles.len()).map(triangle).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn indices_must_name_what_is_there() {
+        let mut mesh =
+            Mesh { positions: vec![DVec3::ZERO; 3], triangles: vec![[0, 1, 2], [2, 1, 0]], ..Mesh::default() };
+        assert_eq!((Mesh::default().check(), mesh.check()), (Ok(()), Ok(())));
+        mesh.normals = Attribute { values: vec![[0.0; 3]; 2], indices: vec![[0, 1, 1]; 2] };
+        assert_eq!(mesh.check(), Ok(()));
+        mesh.normals.indices.pop();
+        assert_eq!(mesh.check(), Err("triangles name normals up to 2, but there are 2".into()));
+        mesh.normals.indices = vec![[0, 7, 0]; 2];
+        assert_eq!(mesh.check(), Err("triangles name normals up to 7, but there are 2".into()));
+        mesh.normals.values.clear();
+        assert_eq!(mesh.check(), Ok(()), "there are none");
+        mesh.triangles[0][1] = 3;
+        assert_eq!(mesh.check(), Err("triangles name positions up to 3, but there are 3".into()));
     }
 }

@@ -3,6 +3,23 @@
 //! All generic engines run the same kernels at different widths: `brute` and `scalar` at width 1 (without and with
 //! the tree), `packetN` at N lanes. Their hits are equal to the last bit; [`crate::ray::slab`] says why. `tile` has its
 //! own arithmetic, and hits that differ where rounding can tell; `tile-exact` asks the common kernel there.
+//!
+//! # Which rays they want
+//! Batches go to [`Engine::intersect`] and [`Engine::occluded`] as they are; their order decides how fast they are traced.
+//!
+//! * `packetN`: N consecutive rays that go about the same way, such as pixels in Morton order ([`crate::camera::fill_tile`]).
+//!   Source: Wald, Slusallek, Benthin, Wagner, "Interactive Rendering with Coherent Ray Tracing", 2001.
+//! * `tile`, `tile-exact` (f32): 16 to 1024 rays in Morton order with a common origin (pixels of a perspective camera), a common
+//!   end (any-hit: shadow rays to a point), a common point behind them (rays off a flat mirror) or one direction (a parallel camera, a sun).
+//!   All else goes to the kernel of `stream`: rays without anything in common, tiles much wider than the triangles they meet, worlds with
+//!   solids or with more shapes than triangles.
+//!   Sources: Reshetov, Soupikov, Hurley, "Multi-level ray tracing algorithm", 2005; Wald, Boulos, Shirley, "Ray tracing
+//!   deformable scenes using dynamic bounding volume hierarchies", 2007; Fuetterling, Lojewski, Pfreundt, Ebert, "Efficient
+//!   ray tracing kernels for modern CPU architectures", 2015.
+//! * `stream`: any rays, up to 4096 of which it sorts by direction itself; the more the better, 128 at least. Occlusion and bounced
+//!   rays, of which neighbours start close to each other. What turns out coherent is traced as packets.
+//!   Sources: Wald, Gribble, Boulos, Kensler, "SIMD Ray Stream Tracing", 2007; Tsakok, "Faster Incoherent Rays: Multi-BVH
+//!   Ray Stream Tracing", 2009; Fuetterling and others, as above.
 
 mod all;
 mod brute;
@@ -64,7 +81,8 @@ pub trait Engine<S: Real>: Sync {
         true
     }
     /// Closest hit of each ray of `rays` into `hits` (reset to the batch's length). With `counters`, the counting
-    /// build of the same kernels runs and adds to them.
+    /// build of the same kernels runs and adds to them. All runs on the calling thread: to use several, give each its own batches
+    /// and its own `scratch`.
     fn intersect(
         &self,
         world: &World<S>,
@@ -85,7 +103,7 @@ pub trait Engine<S: Real>: Sync {
     ) -> bool {
         false
     }
-    /// Whether anything lies in each ray's segment: `out` is resized to the batch's length, 1 is occluded.
+    /// Whether anything lies in each ray's segment: `out` is resized to the batch's length, 1 is occluded. On the calling thread, too.
     fn occluded(
         &self,
         world: &World<S>,

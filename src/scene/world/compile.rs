@@ -38,7 +38,8 @@ impl<S: Compiles> World<S> {
     /// Compiles `description` with trees as `settings` (or a [`Preset`](crate::bvh::Preset)) say, on the current rayon pool.
     ///
     /// # Errors
-    /// Those of [`Assembly::new`].
+    /// Those of [`Assembly::new`], which checks all numbers by which items name groups, meshes, solids and materials, and
+    /// those inside of meshes.
     pub fn compile(description: &Description, settings: impl Into<BuildSettings>) -> Result<Self> {
         Self::compile_after(description, settings, None)
     }
