@@ -288,6 +288,21 @@ fn explain_of_nothing_speaks_of_no_primitives() {
     assert!(said.contains("there are no rays") && !said.contains("other primitives"), "{said}");
 }
 
+#[test]
+fn shapes_that_a_precision_cannot_hold_are_told_of() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("s.kdl"), "sphere\nbox { scale 1e-40 1 1 }\ncone { scale 1e39 }\n")
+        .expect("a scene");
+    for (precision, dropped) in [("f32", 2), ("f64", 0)] {
+        let line = format!("info s.kdl --precision {precision}");
+        let counts = run(&dir, &format!("{line} --json")).json()["counts"].clone();
+        let of = ["dropped_singular", "primitives"].map(|key| counts[key].as_u64());
+        assert_eq!(of, [Some(dropped), Some(3 - dropped)], "{counts}");
+        let text = run(&dir, &line).out;
+        assert_eq!(text.contains("2 shapes too thin or too large for f32"), dropped == 2, "{text}");
+    }
+}
+
 /// What is dropped is counted in no instance.
 #[test]
 fn dropped_triangles_are_in_no_instance() {

@@ -51,6 +51,7 @@ struct Counts {
     instanced_primitives: u64,
     dropped_nonfinite: u64,
     dropped_degenerate: u64,
+    dropped_singular: u64,
     materials: usize,
     emissive_materials: usize,
     lights: usize,
@@ -124,6 +125,7 @@ fn report<'a, S: Engines>(scene: &'a str, description: &'a Description, world: &
             instanced_primitives: stats.instanced_prims,
             dropped_nonfinite: stats.dropped_nonfinite,
             dropped_degenerate: stats.dropped_degenerate,
+            dropped_singular: stats.dropped_singular,
             materials: description.materials.len(),
             emissive_materials: description.materials.iter().filter(|m| m.emission.max_element() > 0.0).count(),
             lights: description.lights.len(),
@@ -166,7 +168,15 @@ fn text(report: &Report<'_>) -> String {
             format!("{}, placed {} times{joined}", counts.objects, counts.instances)
         }),
         ("primitives", format!("{}, {} counting every instance", counts.primitives, counts.instanced_primitives)),
-        ("dropped", format!("{} not finite, {} without area", counts.dropped_nonfinite, counts.dropped_degenerate)),
+        ("dropped", {
+            let of_triangles =
+                format!("{} not finite, {} without area", counts.dropped_nonfinite, counts.dropped_degenerate);
+            match counts.dropped_singular {
+                0 => of_triangles,
+                // Their maps have no inverse, or overflow.
+                shapes => format!("{of_triangles}, {shapes} shapes too thin or too large for {}", report.precision),
+            }
+        }),
         ("materials", format!("{}, {} of them emit light", counts.materials, counts.emissive_materials)),
         ("lights", format!("{}{}", counts.lights, if counts.environment { " and an environment" } else { "" })),
         ("textures", format!("{}, {}", counts.textures, mib(counts.texture_bytes))),
