@@ -41,7 +41,12 @@ impl Default for EngineArgs {
 impl EngineArgs {
     /// The same, but for pictures by blocks: unless an engine is named, one that knows nothing of a ray's neighbours.
     pub fn for_blocks(&self, by_blocks: bool) -> Self {
-        Self { exact: self.exact || by_blocks && self.engine == DEFAULT_ENGINE, ..self.clone() }
+        Self { exact: self.exact || by_blocks && self.is_default(), ..self.clone() }
+    }
+
+    /// Whether no engine is named.
+    pub fn is_default(&self) -> bool {
+        self.engine == DEFAULT_ENGINE
     }
 
     /// The engine asked for.
@@ -49,7 +54,7 @@ impl EngineArgs {
     /// # Errors
     /// Unknown engines, and with `--exact` those that are not.
     pub fn find<S: Engines>(&self) -> Result<&'static dyn Engine<S>> {
-        let engine = if self.exact && self.engine == DEFAULT_ENGINE { EXACT_ENGINE } else { &self.engine };
+        let engine = if self.exact && self.is_default() { EXACT_ENGINE } else { &self.engine };
         let engine = engine_called::<S>(engine)?;
         if self.exact && !engine.is_exact() {
             return Err(Error::Usage(format!("--exact: {} has an arithmetic of its own", engine.name())));

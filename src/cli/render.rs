@@ -1,5 +1,6 @@
 //! `lanecast render`: a picture of a scene.
 
+mod effect;
 mod frames;
 mod kept;
 mod plain;
@@ -91,18 +92,18 @@ pub struct RenderArgs {
     /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Mirror reflections followed [default: 4]; scatterings of a path [default: 16]
+    /// Mirror reflections followed by whitted [default: 4]; scatterings of a path [default: 16]
     #[arg(long, value_name = "N")]
     depth: Option<u32>,
     /// Print rays and time of each bounce or level of recursion
     #[arg(long)]
     stats: bool,
-    /// Occlusion rays per hit
-    #[arg(long, value_name = "N", default_value_t = 16)]
-    ao_samples: u32,
-    /// Length of occlusion rays as a fraction of the scene's diagonal
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.2, allow_negative_numbers = true)]
-    ao_radius: f64,
+    /// Occlusion rays per hit of ao [default: 16]
+    #[arg(long, value_name = "N")]
+    ao_samples: Option<u32>,
+    /// Length of occlusion rays of ao as a fraction of the scene's diagonal [default: 0.2]
+    #[arg(long, value_name = "FRACTION", allow_negative_numbers = true)]
+    ao_radius: Option<f64>,
     /// Extra planes: Z, N, Ns, P, albedo, id.instance, id.primitive, id.material, variance, samples, direct and indirect (path
     /// only), cost.nodes (neither path nor rt), all of these that the integrator has, or cryptomatte
     #[arg(long, value_name = "LIST", default_value = "")]
@@ -260,6 +261,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         None if args.rt_compat => Integrator::Rt,
         chosen => chosen.unwrap_or_default(),
     };
+    args.check_effect(integrator)?;
     let is_path = integrator == Integrator::Path;
     let spp = match args.spp {
         Some(spp) => spp,
@@ -267,6 +269,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         None if is_path => PATH_SAMPLES,
         None => 1,
     };
+    let plain = RenderOptions::default();
     let options = RenderOptions {
         width,
         height,
@@ -280,8 +283,8 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         engine: args.engine.engine.clone(),
         tile: args.tile,
         depth: args.depth.unwrap_or(integrator.depth()),
-        ao_samples: args.ao_samples,
-        ao_radius: args.ao_radius,
+        ao_samples: args.ao_samples.unwrap_or(plain.ao_samples),
+        ao_radius: args.ao_radius.unwrap_or(plain.ao_radius),
         aovs: Aov::parse_list_of(&args.aov, integrator)?,
         levels: args.holds_levels().then_some(args.exposure),
         count: args.output.verbose > 0,

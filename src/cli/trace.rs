@@ -48,7 +48,7 @@ pub struct TraceArgs {
     /// File of rays
     #[arg(long, value_name = "FILE.npy")]
     rays: PathBuf,
-    /// What to ask: closest, any, or all (every stretch inside a solid)
+    /// What to ask: closest, any, or all (every stretch inside a solid; by the engines scalar or packet8)
     #[arg(long, default_value = "closest")]
     query: Asked,
     #[command(flatten)]

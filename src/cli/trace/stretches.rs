@@ -19,6 +19,10 @@ use crate::scene::description::Description;
 use crate::scene::world::World;
 use crate::trace::{Engines, Scratch, Stretch, stretches};
 
+/// Engines that find stretches.
+const ONE_BY_ONE: &str = "scalar";
+const PACKETS: &str = "packet8";
+
 /// The object of `--json`.
 #[derive(Serialize)]
 struct Report<'a> {
@@ -42,7 +46,13 @@ struct Report<'a> {
 /// # Errors
 /// Bad input, [`Error::Mismatch`] if rays one by one give other stretches, [`Error::Interrupted`].
 pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<f32>) -> Result<()> {
-    let scalar = args.engine.find::<S>()?.lanes() == 1;
+    let engine = args.engine.find::<S>()?.name();
+    // What the default stands for has an answer of its own here: packets of eight.
+    if !args.engine.is_default() && ![ONE_BY_ONE, PACKETS].contains(&engine) {
+        let what = format!("--engine {engine}: --query all is answered by {ONE_BY_ONE} or by {PACKETS}, the default");
+        return Err(Error::Usage(what));
+    }
+    let scalar = engine == ONE_BY_ONE;
     let workers = Workers::new(args.threads.count())?;
     let world = workers.install(|| World::<S>::compile(description, args.scene.options.build()))?;
     let batches = split::<S>(rays, workers.threads());
@@ -66,7 +76,7 @@ pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<
     let seconds = summary(&seconds).ok_or_else(|| Error::Usage("--repeat 0: nothing to report".into()))?;
     let report = Report {
         scene: &args.scene.scene,
-        engine: if scalar { "scalar" } else { "packet8" },
+        engine: if scalar { ONE_BY_ONE } else { PACKETS },
         query: "all",
         precision: S::PRECISION,
         isa: compiled_isa(),
