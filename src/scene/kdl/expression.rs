@@ -7,8 +7,8 @@
 //! ```
 //! Angles are degrees. Recursive descent, depth limited, no allocation on the good path.
 
-use super::hash;
 use super::source::{near, quote};
+use super::{hash, hints};
 
 /// Deepest nesting of parentheses, calls and signs.
 const MAX_DEPTH: u32 = 64;
@@ -34,7 +34,7 @@ pub struct Fault {
     pub at: usize,
     /// What is wrong, what was expected.
     pub what: String,
-    /// A name that is spelt alike.
+    /// A name that is spelt alike, or what else may be meant.
     pub help: Option<String>,
 }
 
@@ -61,7 +61,8 @@ pub fn evaluate(text: &str, names: &dyn Names) -> Result<f64, Fault> {
     let mut parser = Parser { text, at: 0, depth: 0, names };
     let value = parser.sum()?;
     if parser.peek().is_some() {
-        return Err(parser.unexpected("an operator or the end of the expression"));
+        let fault = parser.unexpected("an operator or the end of the expression");
+        return Err(Fault { help: hints::several(text), ..fault });
     }
     if !value.is_finite() {
         let what = format!("the value of {} is not finite", quote(text));

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::hints;
 use super::scope::Scope;
 use super::source::{Span, quote};
 use super::syntax::{Entry, Node, Value};
@@ -52,7 +53,11 @@ impl<'s, 'n, 'a> Fields<'s, 'n, 'a> {
             let odd = child.entries.iter().find_map(|e| e.name.as_ref().map(|(_, span)| *span));
             if let Some(span) = odd.or(child.children.as_ref().map(|_| child.span)) {
                 let what = format!("expected `{} value...`: a field has no properties and no block", child.name);
-                return Err(source.error(span, what));
+                let error = source.error(span, what);
+                return Err(match hints::field_with_block(child) {
+                    Some(help) => error.with_help(help),
+                    None => error,
+                });
             }
             fields.add(&child.name, child.span, &child.entries)?;
         }
@@ -250,11 +255,11 @@ impl<'s, 'n, 'a> Fields<'s, 'n, 'a> {
     /// # Errors
     /// If there are any.
     pub fn no_arguments(&self) -> Result<()> {
-        let help = format!("write {} name=value", self.node.name);
         match self.arguments().next() {
             None => Ok(()),
             Some(a) => {
                 let what = format!("`{}` takes no plain values", self.node.name);
+                let help = hints::no_plain_values(self.scope.source, self.node);
                 Err(self.scope.source.error(a.span, what).with_help(help))
             }
         }

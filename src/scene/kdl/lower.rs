@@ -10,7 +10,7 @@ use super::meshes::{Key, MAX_GENERATED, MeshFiles, Store, polygon};
 use super::scope::Scope;
 use super::source::{Span, quote};
 use super::syntax::Node;
-use super::{expression, flake, settings, shapes, solids, terrain, transform, twig};
+use super::{expression, flake, hints, settings, shapes, solids, terrain, transform, twig};
 use crate::error::{Error, Result};
 use crate::scene::description::{Description, GroupId, Item, ItemKind, MaterialId, Shape};
 
@@ -348,6 +348,9 @@ impl<'a, 'n> Lowering<'a, 'n> {
         }
         if settings::NAMES.contains(&name) || name == "define" {
             return source.error(node.span, format!("`{name}` belongs to the top level of the file"));
+        }
+        if name.starts_with("--") {
+            return source.error(node.span, format!("unknown statement {}", quote(name))).with_help(hints::COMMENT);
         }
         let known = shapes::NAMES.iter().chain(&PLACING).chain(&settings::NAMES).chain(&transform::NAMES);
         let known = known.chain(&solids::OPERATIONS).chain(&solids::SOLIDS).chain(&["define"]).copied();

@@ -7,6 +7,7 @@
 
 use std::borrow::Cow;
 
+use super::hints;
 use super::source::{Source, Span};
 use super::token::{Cursor, is_newline};
 use crate::error::Result;
@@ -142,7 +143,15 @@ impl<'a> Reader<'a> {
                 Some(c) if is_newline(c) => return Ok(node),
                 _ if self.cursor.rest().starts_with("//") => return Ok(node),
                 _ if block_seen => return Err(self.cursor.unexpected("a new line or `;` after `}`")),
-                _ if !spaced => return Err(self.cursor.unexpected("a space between values")),
+                _ if !spaced => {
+                    let error = self.cursor.unexpected("a space between values");
+                    let is_property = node.entries.is_empty() && self.cursor.peek() == Some('=');
+                    let help = is_property.then(|| hints::field_in_block(&node.name, &self.cursor.rest()[1..]));
+                    return Err(match help {
+                        Some(help) => error.with_help(help),
+                        None => error,
+                    });
+                }
                 _ => {
                     let entry = self.entry()?;
                     node.entries.push(entry);

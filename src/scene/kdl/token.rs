@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use super::hints;
+use super::number::{number_from, starts_with_digit};
 use super::source::{Source, Span, quote};
 use super::syntax::Value;
 use crate::error::{Error, Result};
@@ -184,9 +186,13 @@ impl<'a> Cursor<'a> {
             Some(c) => quote(&c.to_string()),
         };
         let error = self.error_from(self.at, format!("expected {wanted}, found {found}"));
-        match self.peek() {
-            Some('(') => error.with_help("expressions stand in quotes: \"(a + b) * 2\""),
-            _ => error,
+        let (before, rest) = self.source.text.split_at(self.at);
+        match rest.strip_prefix('(') {
+            Some(inner) => match hints::list(before, inner).filter(|_| hints::is_list(inner)) {
+                Some(help) => error.with_help(help),
+                None => error.with_help("expressions stand in quotes: \"(a + b) * 2\""),
+            },
+            None => error,
         }
     }
 
@@ -222,7 +228,11 @@ impl<'a> Cursor<'a> {
             word @ ("inf" | "-inf" | "nan") => {
                 Err(self.error_from(start, format!("expected a finite number, found `#{word}`")))
             }
-            word => Err(self.error_from(start, format!("expected `#true` or `#false`, found {}", quote(word)))),
+            word => {
+                let found = quote(&format!("#{word}"));
+                let error = self.error_from(start, format!("expected `#true` or `#false`, found {found}"));
+                Err(error.with_help(hints::COMMENT))
+            }
         }
     }
 
@@ -233,9 +243,13 @@ impl<'a> Cursor<'a> {
         match parsed {
             Some(value) if value.is_finite() => Ok(Value::Number(value)),
             Some(_) => Err(self.error_from(start, format!("{} is too large for a number", quote(word)))),
-            None => Err(self
-                .error_from(start, format!("expected a number, found {}", quote(word)))
-                .with_help("expressions and names that start with a digit stand in quotes")),
+            None => {
+                let (before, rest) = self.source.text.split_at(start);
+                let help = hints::list(before, rest).filter(|_| word.contains(','));
+                let help =
+                    help.unwrap_or_else(|| "expressions and names that start with a digit stand in quotes".into());
+                Err(self.error_from(start, format!("expected a number, found {}", quote(word))).with_help(help))
+            }
         }
     }
 
@@ -334,54 +348,9 @@ impl<'a> Cursor<'a> {
     }
 }
 
-fn starts_with_digit(s: &str) -> bool {
-    s.starts_with(|c: char| c.is_ascii_digit())
-}
-
 /// At most 40 characters of `word`.
 fn cut(word: &str) -> String {
     word.chars().take(40).collect()
-}
-
-/// The number written as `word`, by KDL's grammar: decimal, `0x`, `0o` or `0b`, with `_` between digits.
-fn number_from(word: &str) -> Option<f64> {
-    let (sign, digits) = match word.as_bytes().first()? {
-        b'-' => (-1.0, &word[1..]),
-        b'+' => (1.0, &word[1..]),
-        _ => (1.0, word),
-    };
-    for (prefix, radix) in [("0x", 16), ("0o", 8), ("0b", 2)] {
-        if let Some(digits) = digits.strip_prefix(prefix) {
-            return in_radix(digits, radix).map(|v| sign * v);
-        }
-    }
-    is_decimal(digits).then(|| digits.replace('_', "").parse::<f64>().ok()).flatten().map(|v| sign * v)
-}
-
-fn in_radix(digits: &str, radix: u32) -> Option<f64> {
-    if digits.starts_with('_') || digits.is_empty() {
-        return None;
-    }
-    let mut value = 0.0;
-    for c in digits.chars().filter(|&c| c != '_') {
-        value = value * f64::from(radix) + f64::from(c.to_digit(radix)?);
-    }
-    Some(value)
-}
-
-/// `integer ('.' integer)? ([eE] sign? integer)?` with `integer := digit (digit | '_')*`.
-fn is_decimal(word: &str) -> bool {
-    let integer = |s: &str| starts_with_digit(s) && s.bytes().all(|b| b.is_ascii_digit() || b == b'_');
-    let (mantissa, exponent) = match word.split_once(['e', 'E']) {
-        Some((mantissa, exponent)) => (mantissa, Some(exponent)),
-        None => (word, None),
-    };
-    let exponent_ok = exponent.is_none_or(|e| integer(e.strip_prefix(['+', '-']).unwrap_or(e)));
-    let mantissa_ok = match mantissa.split_once('.') {
-        Some((whole, fraction)) => integer(whole) && integer(fraction),
-        None => integer(mantissa),
-    };
-    exponent_ok && mantissa_ok
 }
 
 /// Characters of bare names.
