@@ -26,7 +26,7 @@ pub const MAX_NESTING: usize = 64;
 /// Numbered objects and placements, f64.
 #[derive(Clone, Debug, Default)]
 pub struct Assembly {
-    /// Distinct geometries.
+    /// Distinct geometries that are placed, in the order of their groups.
     pub objects: Vec<AssemblyObject>,
     /// Instances of them; the index is the `inst` number of a hit.
     pub placements: Vec<Placement>,
