@@ -104,12 +104,6 @@ fn refusals_say_what_is_expected() {
         ("render square.ply -o a.exr --eye 0,5,0 --look-at 0,0,0 --up 0,1,0", "--up must not point along the view"),
         ("view square.ply --eye 0,5,0 --look-at 0,0,0 --up 0,-2,0", "--up must not point along the view"),
         ("render square.ply -o a.exr --integrator ao --ao-radius -1", "radius -1: expected a positive number"),
-        ("render square.ply -o a.exr --ao-radius 1", "--ao-radius 1: whitted has no occlusion rays, only ao"),
-        (
-            "render square.ply -o a.exr --integrator path --ao-samples 4",
-            "--ao-samples 4: path has no occlusion rays, only ao",
-        ),
-        ("render square.ply -o a.exr --integrator ao --depth 2", "--depth 2: ao has no depth that can be chosen"),
         ("render square.ply -o no/such/folder/a.exr", "no/such/folder"),
         ("render square.ply -o a.exr --noise -1", "noise -1: expected a positive number"),
         ("render square.ply -o a.exr --time-limit -2", "time limit -2: expected a positive number"),
@@ -123,6 +117,23 @@ fn refusals_say_what_is_expected() {
         refused(dir.path(), &line.split(' ').collect::<Vec<_>>(), what);
     }
     assert_eq!(files(dir.path()), ["square.ply"]);
+}
+
+#[test]
+fn options_without_effect_are_warned_of() {
+    let dir = square();
+    for (options, what) in [
+        ("--ao-radius 1", "warning: --ao-radius 1: whitted has no occlusion rays, only ao"),
+        ("--integrator path --ao-samples 4", "warning: --ao-samples 4: path has no occlusion rays, only ao"),
+        ("--integrator ao --depth 2", "warning: --depth 2: ao has no depth that can be chosen, only whitted and path"),
+        ("--integrator ao --ao-samples 2 --ao-radius 1", ""),
+        ("--depth 2", ""),
+    ] {
+        let line = format!("render square.ply -o a.exr --size 8x8 --spp 1 --threads 1 {options}");
+        let ended = lanecast(dir.path(), &line.split(' ').collect::<Vec<_>>());
+        let warned: Vec<_> = ended.err.lines().filter(|line| line.starts_with("warning: ")).collect();
+        assert_eq!((ended.code, warned.join("\n").as_str()), (Some(0), what), "{options}");
+    }
 }
 
 /// Nothing to look at is no error: whatever is shown, the picture is that of rays that miss.

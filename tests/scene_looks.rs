@@ -52,6 +52,17 @@ fn mirrors_leave_the_rest_to_the_base() {
     assert_eq!(of("mirror 0.25; texture \"a.png\"").0, [0.75; 3]);
     assert_eq!(of("texture \"a.png\"").0, [1.0; 3]);
     assert_eq!(of("diffuse 0.7; mirror 0.3"), ([0.7; 3], [0.3; 3]));
+    // What is said is taken as it is said, and warned of.
+    assert_eq!(of("diffuse 0.5; mirror 0.25 0.75 0"), ([0.5; 3], [0.25, 0.75, 0.0]));
+    let warnings = |text: &str| {
+        let scene = read_in(Some(folder.path()), &format!("material \"m\" {{ {text} }}")).unwrap();
+        scene.warnings
+    };
+    let bright = "material \"m\": `diffuse` and `mirror` add up to 1.25: it reflects more light than it gets";
+    assert_eq!(warnings("diffuse 0.5; mirror 0.25 0.75 0"), [bright]);
+    for text in ["diffuse 0.7; mirror 0.3", "mirror 0.9", "diffuse 0.9; mirror 0.9; plastic"] {
+        assert!(warnings(text).is_empty(), "{text}");
+    }
     // Models have no use for a mirror besides their own.
     assert_eq!(of("diffuse 0.9; mirror 0.9; plastic").0, [0.9; 3]);
     assert_eq!(of("mirror 0.9; plastic").0, [0.7; 3]);
@@ -224,7 +235,6 @@ fn what_is_wrong_is_said_where_it_stands() {
         ("material \"a\" { conductor }", "1:16", "expected a metal (`conductor gold`), or both `eta` and `k`"),
         ("material \"a\" { conductor gold k=1 }", "1:16", "or both `eta` and `k`"),
         ("material \"a\" { conductor eta=0 k=1 }", "1:26", "`eta` must be above zero"),
-        ("material \"a\" { diffuse 0.5; mirror 0.2 0.6 0.1 }", "1:16", "`diffuse` and `mirror` add up to 1.1: "),
         ("material \"a\" { plastic; dielectric }", "1:25", "this one has `plastic`"),
         ("material \"a\" { plastik }", "1:16", "did you mean `plastic`?"),
         ("material \"a\" { plastic roughness=2 }", "1:24", "`roughness` takes a number from 0 to 1, found 2"),

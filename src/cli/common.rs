@@ -44,6 +44,13 @@ impl EngineArgs {
         Self { exact: self.exact || by_blocks && self.is_default(), ..self.clone() }
     }
 
+    /// The same, but for pictures of node visits: unless an engine is named, those of single rays, which say what the scene asks of
+    /// a ray. Those of a tile are one number for all its rays.
+    pub fn for_costs(&self, is_cost: bool) -> Self {
+        let engine = if is_cost && self.is_default() { "scalar".into() } else { self.engine.clone() };
+        Self { engine, ..self.clone() }
+    }
+
     /// Whether no engine is named.
     pub fn is_default(&self) -> bool {
         self.engine == DEFAULT_ENGINE

@@ -261,7 +261,7 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
         None if args.rt_compat => Integrator::Rt,
         chosen => chosen.unwrap_or_default(),
     };
-    args.check_effect(integrator)?;
+    args.warn_of_effect(integrator);
     let is_path = integrator == Integrator::Path;
     let spp = match args.spp {
         Some(spp) => spp,
@@ -310,7 +310,8 @@ fn picture<S: Shades>(
     world: &World<S>,
     partly: bool,
 ) -> Result<()> {
-    let engine = args.engine.for_blocks(args.preview.by_blocks()).find::<S>()?;
+    let is_cost = options.integrator == Integrator::Cost;
+    let engine = args.engine.for_costs(is_cost).for_blocks(args.preview.by_blocks()).find::<S>()?;
     let (width, height) = (options.width, options.height);
     let camera_args = if args.rt_compat { args.camera.or_default_view() } else { args.camera.clone() };
     let camera = camera_args.ready(description, world.bounds(), (width, height))?.camera;

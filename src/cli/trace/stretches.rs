@@ -49,10 +49,10 @@ pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<
     let engine = args.engine.find::<S>()?.name();
     // What the default stands for has an answer of its own here: packets of eight.
     if !args.engine.is_default() && ![ONE_BY_ONE, PACKETS].contains(&engine) {
-        let what = format!("--engine {engine}: --query all is answered by {ONE_BY_ONE} or by {PACKETS}, the default");
-        return Err(Error::Usage(what));
+        let what = format!("--engine {engine}: --query all is answered by {ONE_BY_ONE} or, as now, by {PACKETS}");
+        args.output.warn([&what]);
     }
-    let scalar = engine == ONE_BY_ONE;
+    let scalar = args.engine.find::<S>()?.lanes() == 1;
     let workers = Workers::new(args.threads.count())?;
     let world = workers.install(|| World::<S>::compile(description, args.scene.options.build()))?;
     let batches = split::<S>(rays, workers.threads());

@@ -37,7 +37,7 @@ pub struct Mix<'n> {
 /// mixes.
 ///
 /// # Errors
-/// Fields that do not fit, reflectances above 1 (also of `diffuse` and `mirror` together), several models, files that cannot be used.
+/// Fields that do not fit, reflectances above 1, several models, files that cannot be used.
 pub fn material<'n, 'a>(
     scope: &Scope<'a>,
     node: &'n Node<'a>,
@@ -88,18 +88,19 @@ pub fn material<'n, 'a>(
 /// base gets nothing.
 fn reflectances(fields: &Fields<'_, '_, '_>, plain: DVec3, is_matte: bool) -> Result<(DVec3, DVec3)> {
     let mirror = fields.colour("mirror", 1.0)?.unwrap_or(DVec3::ZERO);
-    let Some(diffuse) = fields.colour("diffuse", 1.0)? else {
-        return Ok((if is_matte { plain.min(DVec3::ONE - mirror) } else { plain }, mirror));
-    };
-    let most = (diffuse + mirror).max_element();
-    // Numbers like 0.7 and 0.3 need not add up to 1 exactly.
-    if is_matte && most > 1.0 + 1e-9 {
-        let what = format!("`diffuse` and `mirror` add up to {most}: a surface reflects at most 1 of any colour");
-        return Err(fields
-            .error_at("diffuse", what)
-            .with_help("without `diffuse` it is what `mirror` leaves, at most 0.7"));
-    }
-    Ok((diffuse, mirror))
+    let diffuse = fields.colour("diffuse", 1.0)?;
+    let left = if is_matte { plain.min(DVec3::ONE - mirror) } else { plain };
+    Ok((diffuse.unwrap_or(left), mirror))
+}
+
+/// What is to be said of a material that reflects more than it gets; numbers like 0.7 and 0.3 need not add up to 1 exactly.
+pub fn warning(material: &Material) -> Option<String> {
+    let most = (material.diffuse + material.mirror).max_element();
+    let is_bright = material.scattering == Scattering::Matte && most > 1.0 + 1e-9;
+    is_bright.then(|| {
+        let name = &material.name;
+        format!("material \"{name}\": `diffuse` and `mirror` add up to {most}: it reflects more light than it gets")
+    })
 }
 
 /// How `node` of `kind` scatters, and whether facets throw light at each other.

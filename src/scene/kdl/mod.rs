@@ -153,11 +153,13 @@ fn material<'a, 'n>(
     node: &'n Node<'a>,
     images: &mut Images<'_>,
 ) -> Result<Option<Mix<'n>>> {
-    let materials = &mut lowering.description.materials;
+    let materials = &lowering.description.materials;
     let (name, span) = node.title().unwrap_or(("", node.span));
     let is_default = name == "default" && materials[0] == Default::default();
     let id = if is_default { 0 } else { materials.len() as u32 };
     let (material, mix) = materials::material(&lowering.scope, node, id, images)?;
+    lowering.description.warnings.extend(materials::warning(&material));
+    let materials = &mut lowering.description.materials;
     if is_default {
         materials[0] = material;
         return Ok(mix);
