@@ -22,6 +22,7 @@
 
 use super::edges::{Doubt, cross, cross_accurate, doubt, longest, minus, own_edges, sum};
 use super::groups::{Groups, splats};
+use super::parallel::Parallel;
 use super::place::Place;
 use super::{HALF_ULP, Mask, SETS, V, select};
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, f32x8, map3};
@@ -29,6 +30,9 @@ use crate::shape::Block;
 
 /// Triangles set up together.
 pub const BATCH: usize = 16;
+
+/// Triangles that may wait: as many again.
+pub const ROOM: usize = 2 * BATCH;
 
 /// Spanned volume (of a scene of unit size) from which on products of coordinates keep their digits.
 pub const LEAST_VOLUME: f32 = 1e-30;
@@ -58,25 +62,25 @@ const WILD: f32 = 0.25;
 #[repr(C, align(64))]
 pub struct Batch {
     /// In the space of the geometry; of instances: in the frame.
-    corners: [[f32; BATCH + 8]; 9],
+    pub corners: [[f32; ROOM]; 9],
     /// Of instances, any-hit: the first corner and the two sides that leave it, in the world and the scale of the frame.
-    side: [[f32; BATCH + 8]; 9],
+    side: [[f32; ROOM]; 9],
     /// Primitive number; `EXACT`: block * 8 + place.
-    pub id: [u32; BATCH + 8],
+    pub id: [u32; ROOM],
     /// Of instances: the instance.
-    pub inst: [u32; BATCH + 8],
+    pub inst: [u32; ROOM],
     /// Of instances: block * 8 + place.
-    pub slot: [u32; BATCH + 8],
+    pub slot: [u32; ROOM],
     /// Groups that met the leaf.
-    pub groups: [u64; BATCH + 8],
+    pub groups: [u64; ROOM],
     pub len: usize,
 }
 
 impl Default for Batch {
     fn default() -> Self {
-        let numbers = [0; BATCH + 8];
-        let reals = [[0.0; BATCH + 8]; 9];
-        Self { corners: reals, side: reals, id: numbers, inst: numbers, slot: numbers, groups: [0; BATCH + 8], len: 0 }
+        let numbers = [0; ROOM];
+        let reals = [[0.0; ROOM]; 9];
+        Self { corners: reals, side: reals, id: numbers, inst: numbers, slot: numbers, groups: [0; ROOM], len: 0 }
     }
 }
 
@@ -176,6 +180,12 @@ impl Batch {
         self.len = at + count;
     }
 
+    /// Those that are set up next, as bits.
+    #[inline(always)]
+    pub fn lanes(&self) -> u32 {
+        (1u32 << self.len.min(BATCH)) - 1
+    }
+
     /// Corners of a waiting triangle.
     pub fn corners(&self, i: usize) -> [f32; 9] {
         std::array::from_fn(|f| self.corners[f][i])
@@ -184,18 +194,14 @@ impl Batch {
     /// Sets up what waits. Returns the triangles that may be seen from the tile.
     #[inline(always)]
     pub fn set_up<const ANY: bool, const EXACT: bool>(&self, groups: &Groups, planes: &mut Planes) -> u32 {
-        let apex = map3(groups.frame.apex, V::splat);
-        let p: [Lanes3<V>; 3] = each(|i| {
-            let corner = each(|a| V::load(&self.corners[3 * i + a]));
-            if !EXACT && groups.many { corner } else { groups.frame.coordinates(each(|a| corner[a] - apex[a])) }
-        });
+        // What is told it by reference would lie in memory for all: so it finds the corners itself.
+        if !EXACT && let Some(parallel) = &groups.frame.parallel {
+            return self.set_up_parallel::<ANY>(parallel, groups, planes);
+        }
+        let p = self.seen(groups, !EXACT && groups.many);
         let (d1, d2) = (minus(p[1], p[0]), minus(p[2], p[0]));
         if !EXACT {
-            let normal = cross_accurate(d1, d2);
-            return match &groups.frame.parallel {
-                Some(parallel) => self.set_up_parallel::<ANY>(parallel, groups, planes, &p, normal),
-                None => self.set_up_own::<ANY>(groups, planes, &p, normal),
-            };
+            return self.set_up_own::<ANY>(groups, planes, &p, cross_accurate(d1, d2));
         }
         let normal = cross(d1, d2);
         let volume = dot(normal, p[0]);
@@ -216,7 +222,7 @@ impl Batch {
         let [x, y, z] = map3(normal, |n| n * rcp);
         let inverse = [pick(x, zero), pick(y, zero), pick(z, V::splat(f32::MAX))];
         if groups.is_behind {
-            self.set_up_side(groups, planes);
+            self.set_up_side(groups, planes, None);
             pick(zero, V::splat(f32::INFINITY)).store(&mut planes.facing);
         }
         let edges = [cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])];
@@ -233,7 +239,17 @@ impl Batch {
         pick(eps, V::splat(f32::INFINITY)).store(&mut planes.inside);
         most.store(&mut planes.most);
         pick(one - rho, zero).store(&mut planes.least);
-        planes.store(groups, &linear, width, |inverse| inverse * most) & ((1u32 << self.len) - 1)
+        planes.store(groups, &linear, width, |inverse| inverse * most) & self.lanes()
+    }
+
+    /// The corners in the frame. `many`: they are waiting there.
+    #[inline(always)]
+    pub fn seen(&self, groups: &Groups, many: bool) -> [Lanes3<V>; 3] {
+        let apex = map3(groups.frame.apex, V::splat);
+        each(|i| {
+            let corner = each(|a| V::load(&self.corners[3 * i + a]));
+            if many { corner } else { groups.frame.coordinates(each(|a| corner[a] - apex[a])) }
+        })
     }
 
     /// The first corner and the two sides that leave it, in the world and the scale of the frame.
@@ -251,10 +267,10 @@ impl Batch {
     /// Set-up for segments that start anywhere. Not from the corners in the frame: theirs is another normal, if the triangle
     /// is a needle. Returns the triangles that some segment may start behind.
     #[inline(always)]
-    pub fn set_up_side(&self, groups: &Groups, planes: &mut Planes) -> u32 {
+    pub fn set_up_side(&self, groups: &Groups, planes: &mut Planes, parallel: Option<&Parallel>) -> u32 {
         let (corner, sides) = self.sides(groups);
         let normal = cross_accurate(sides[0], sides[1]);
-        let from_apex = match &groups.frame.parallel {
+        let from_apex = match parallel {
             Some(parallel) => parallel.view.map(|x| V::splat(x * groups.frame.scale)),
             None => each(|a| corner[a] - V::splat(groups.frame.apex[a] * groups.frame.scale)),
         };
@@ -283,7 +299,7 @@ impl Batch {
         let rcp = one / volume;
         let mut reached = u32::MAX;
         if ANY || groups.is_behind {
-            reached = self.set_up_side(groups, planes);
+            reached = self.set_up_side(groups, planes, None);
         }
         // Over the volume an edge function is positive on the side that faces the apex, and the corner's weight times 1/z.
         let each_inverse = map3(*p, |q| one / q[2]);
@@ -302,7 +318,7 @@ impl Batch {
         nearest.store(&mut planes.nearest);
         farthest.store(&mut planes.farthest);
 
-        let in_front = ((1u32 << self.len) - 1) & zero.cmp_lt(high).bits();
+        let in_front = self.lanes() & zero.cmp_lt(high).bits();
         // Seen from its own plane, or from its corner, a triangle has no depth that its corners would not belie.
         let [a, b, c] = map3(*p, sum);
         let (lengths, closest) = (sum(normal) * a, a.fast_min(b).fast_min(c));

@@ -103,6 +103,8 @@ pub struct Groups {
     pub rect: [[[V; SETS]; 2]; 2],
     /// Of a full tile the same as rectangles of one size, if they nearly are.
     pub even: Option<Even>,
+    /// All rays are there, and start in the common point and have no end.
+    pub full: bool,
     /// The same as fractions of the tile's rectangle.
     pub part: [[[V; SETS]; 2]; 2],
     /// Rays with a common end: factor of [`Group::inv_lo`] that makes it sure. Else 1, and it is sure by itself.
@@ -150,6 +152,7 @@ impl Default for Groups {
             loose: 0.0,
             rect: [[zero; 2]; 2],
             even: None,
+            full: false,
             part: [[zero; 2]; 2],
             reach: 1.0,
             least: zero,
@@ -277,6 +280,7 @@ impl Groups {
             return false;
         }
         self.even = if full { Even::of::<N>(self) } else { None };
+        self.full = full && bundle.shared == Shared::Start;
         for axis in 0..2 {
             let [lo, hi] = self.bounds[axis];
             let scale = V::splat(if hi > lo { 1.0 / (hi - lo) } else { 0.0 });

@@ -28,6 +28,8 @@ mod exact;
 mod fine;
 mod frame;
 mod full;
+mod gaps;
+mod grid;
 mod groups;
 mod held;
 mod lines;
@@ -84,6 +86,9 @@ const GROUPS: usize = SETS * SET;
 /// Most rays in a tile.
 const BLOCK: usize = GROUPS * V::N;
 
+/// Groups up to which a call is left to the packet kernel: to look for what their rays have in common takes as long as to trace them.
+const FEW: usize = 3;
+
 /// Half the distance from 1 to the next number: the largest relative error of one operation.
 const HALF_ULP: f32 = f32::EPSILON / 2.0;
 
@@ -92,6 +97,9 @@ const HALF_ULP: f32 = f32::EPSILON / 2.0;
 pub struct Memory {
     groups: groups::Groups,
     batch: batch::Batch,
+    /// Those of them that are left where some are left out ([`gaps`]).
+    kept: batch::Batch,
+    trial: gaps::Trial,
     planes: batch::Planes,
     listing: listing::Listing,
     again: pairs::Again,
@@ -182,6 +190,10 @@ impl<'a> Job<'a> {
     }
 
     fn run<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self) {
+        if self.most == GROUPS && self.rays.len() <= FEW * V::N {
+            (0..self.rays.len()).step_by(V::N).for_each(|first| self.packet::<ANY, COUNT>(first));
+            return;
+        }
         let mirrors = !ANY && self.most == GROUPS && suits(self.world, true);
         let suits = suits(self.world, EXACT);
         if suits {

@@ -137,7 +137,7 @@ impl Planes {
     }
 
     /// The same for rays of one direction.
-    #[inline(always)]
+    #[inline(never)]
     fn set_parallel(&mut self, parallel: &Parallel, groups: &Groups, frame: &Frame, margin: f32) {
         let [u, v, a] = frame.axes;
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
@@ -157,7 +157,23 @@ impl Planes {
     /// All children at once, whatever will be found in the nearest: few are left out for that later, while a test by itself is
     /// mostly waited for.
     #[inline(always)]
-    pub fn open<const N: usize>(
+    pub fn open<const N: usize>(&self, node: &Node<f32, WIDTH>, tile: (&Groups, u64), level: &mut Level) -> u32 {
+        // Two pieces of code: what only rays of one direction need costs the others 2 %.
+        match self.height {
+            None => self.open_from::<N, false>(node, tile, level),
+            Some(_) => self.open_along::<N>(node, tile, level),
+        }
+    }
+
+    /// The same for rays of one direction.
+    #[inline(never)]
+    fn open_along<const N: usize>(&self, node: &Node<f32, WIDTH>, tile: (&Groups, u64), level: &mut Level) -> u32 {
+        self.open_from::<N, true>(node, tile, level)
+    }
+
+    /// The same; `ALONG`: whether rays have a direction in common and not a point.
+    #[inline(always)]
+    fn open_from<const N: usize, const ALONG: bool>(
         &self,
         node: &Node<f32, WIDTH>,
         (tile, groups): (&Groups, u64),
@@ -168,9 +184,9 @@ impl Planes {
         let side = |side: usize| each(|a| Children::load(&node.bounds[a][side]) - splat(self.apex[a]));
         let (lo, hi): ([Children; 3], [Children; 3]) = (side(0), side(1));
         let (sum, size): ([Children; 3], [Children; 3]) = (each(|a| hi[a] + lo[a]), each(|a| hi[a] - lo[a]));
-        let middle = |n: [f32; 3], offset: f32| {
+        let middle = |n: [f32; 3]| {
             let n = map3(n, splat);
-            n[0].mul_add(sum[0], n[1].mul_add(sum[1], n[2].mul_add(sum[2], splat(-offset))))
+            n[0].mul_add(sum[0], n[1].mul_add(sum[1], n[2] * sum[2]))
         };
         let radius = |n: [f32; 3], e: f32| {
             let n = map3(n, splat);
@@ -178,19 +194,20 @@ impl Planes {
         };
         // Of the planes of either family along an axis, as they are at one of the tile's edges.
         let planes = |axis: usize, edge: usize| {
-            let m = middle(self.normal[axis][edge], self.offset[axis][edge]);
+            let through = middle(self.normal[axis][edge]);
+            let m = if ALONG { through - splat(self.offset[axis][edge]) } else { through };
             let r = radius(self.size[axis][edge], self.margin[axis][edge]);
             (r + m, r - m)
         };
         let ((left_low, right_low), (left_high, right_high)) = (planes(0, 0), planes(0, 1));
         let ((below_low, above_low), (below_high, above_high)) = (planes(1, 0), planes(1, 1));
-        let (mz, rz) = (middle(self.depth, 0.0), radius(self.depth_size, self.depth_margin));
+        let (mz, rz) = (middle(self.depth), radius(self.depth_size, self.depth_margin));
         // Left of the tile's left edge or right of its right edge, all of the box.
         let least = left_low.fast_min(below_low).fast_min(right_high.fast_min(above_high));
         // Heights grow towards where the tile is seen from, and their reciprocals are depths.
         let (near, far) = match self.height {
-            None => (mz - rz, mz + rz),
-            Some(height) => (splat(1.0) / (mz + rz + splat(height)), splat(f32::INFINITY)),
+            Some(height) if ALONG => (splat(1.0) / (mz + rz + splat(height)), splat(f32::INFINITY)),
+            _ => (mz - rz, mz + rz),
         };
         let outside = least.cmp_lt(zero) | far.cmp_lt(splat(self.front)) | splat(tile.farthest).cmp_lt(near);
         let mut met = !outside.bits() & ((1u32 << node.used.min(WIDTH as u32)) - 1);
@@ -210,7 +227,7 @@ impl Planes {
             (high - low).store(&mut sides.step[family]);
         }
         near.fast_max(zero).store(&mut level.near);
-        let of_sets = self.spans.met::<N>(&lo, &hi);
+        let of_sets = self.spans.met::<N, ALONG>(&lo, &hi);
         let (mut rest, mut kept) = (met, 0);
         while rest != 0 {
             let child = slot(rest.trailing_zeros());

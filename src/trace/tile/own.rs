@@ -9,6 +9,7 @@ use super::dead::store;
 use super::exact::Exact;
 use super::groups::{Group, Groups, NO_SLOT};
 use super::held::{Line, Plane};
+use super::parallel::Parallel;
 use super::shapes;
 use super::{Mask, V, select};
 use crate::lanes::chosen::merge;
@@ -261,11 +262,7 @@ impl Groups {
     fn own_numbers(&self, g: usize, bundle: &Bundle) -> (Mask, V, V, V) {
         let found = Mask::from_bits(!positions(&self.of[g].slot, NO_SLOT));
         let (depth, t) = match &self.frame.parallel {
-            Some(parallel) => {
-                let start = bundle.ends(g)[0];
-                let t = parallel.between(start + self.ahead[g], self.behind[g], self.of[g].inv_lo);
-                (V::constant(1.0), t.fast_max(start))
-            }
+            Some(parallel) => (V::constant(1.0), self.way_along(parallel, g, bundle)),
             None => {
                 let depth = V::constant(1.0) / self.of[g].inv_lo;
                 let t = depth * self.of[g].slowness;
@@ -279,6 +276,13 @@ impl Groups {
         }
         let [u, v] = self.of[g].weights.map(|w| select(found, w * depth, V::constant(0.0)));
         (found, t, u, v)
+    }
+
+    /// Of rays of one direction: their parameters at their hits.
+    #[inline(never)]
+    fn way_along(&self, parallel: &Parallel, g: usize, bundle: &Bundle) -> V {
+        let start = bundle.ends(g)[0];
+        parallel.between(start + self.ahead[g], self.behind[g], self.of[g].inv_lo).fast_max(start)
     }
 
     /// Writes a group's own hits and misses, by their names. `past`: past the caches.

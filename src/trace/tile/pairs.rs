@@ -58,13 +58,18 @@ impl Tested {
     }
 }
 
-/// Sets up the waiting triangles and takes their hits.
+/// Sets up the waiting triangles and takes their hits; where some are left out first, when enough are left. `last`: those that
+/// are left, however few.
 #[inline(never)]
 pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
     memory: &mut Memory,
     exact: &Exact,
     counters: &mut Counters,
+    last: bool,
 ) {
+    if !ANY && !EXACT && (last || memory.trial.gaps.is_some()) && !memory.thin(last) {
+        return;
+    }
     let Memory { groups, batch, planes, listing, .. } = memory;
     let seen = batch.set_up::<ANY, EXACT>(groups, planes);
     listing.fill::<N, EXACT>(seen, &batch.groups, groups, planes);
@@ -88,6 +93,9 @@ pub fn flush<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bo
     };
     memory.batch.clear();
     memory.slabs.learn(memory.listing.pairs, found);
+    if !ANY && !EXACT {
+        memory.trial.learn::<N>(memory.listing.pairs, &memory.groups);
+    }
     if changed != 0 {
         memory.groups.refresh::<N>(changed);
     }

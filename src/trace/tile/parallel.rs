@@ -15,13 +15,13 @@ use glam::DVec3;
 use super::batch::{Batch, LEAST_PART, LEAST_VOLUME, Planes, steady};
 use super::bundle::{Bundle, Shared, TAME, groups, largest, load3};
 use super::columns::Segments;
-use super::edges::{own_edges, sum};
+use super::edges::{cross_accurate, minus, own_edges, sum};
 use super::frame::{Frame, normalised, reach, sides};
 use super::groups::{Group, Groups};
 use super::lines::Lines;
 use super::{GROUPS, HALF_ULP, Job, Mask, SET, SETS, V, select};
 use crate::lanes::words::{greatest, least};
-use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each, map3};
+use crate::lanes::{LaneMask, Lanes, dot, each, map3};
 use crate::math::Aabb;
 use crate::ray::Rays;
 
@@ -282,20 +282,15 @@ impl Job<'_> {
 }
 
 impl Batch {
-    /// Set-up for rays of one direction. `p`: corners in the frame, `normal`: their normal there.
-    #[inline(always)]
-    pub fn set_up_parallel<const ANY: bool>(
-        &self,
-        parallel: &Parallel,
-        groups: &Groups,
-        planes: &mut Planes,
-        p: &[Lanes3<V>; 3],
-        normal: Lanes3<V>,
-    ) -> u32 {
+    /// Set-up for rays of one direction.
+    #[inline(never)]
+    pub fn set_up_parallel<const ANY: bool>(&self, parallel: &Parallel, groups: &Groups, planes: &mut Planes) -> u32 {
         let one = V::constant(1.0);
-        let reached = self.set_up_side(groups, planes);
-        let seen = map3(*p, |q| [q[0], q[1], one]);
-        let [a, b, c] = map3(*p, |q| q[2] + V::splat(parallel.height));
+        let p = self.seen(groups, false);
+        let normal = cross_accurate(minus(p[1], p[0]), minus(p[2], p[0]));
+        let reached = self.set_up_side(groups, planes, Some(parallel));
+        let seen = map3(p, |q| [q[0], q[1], one]);
+        let [a, b, c] = map3(p, |q| q[2] + V::splat(parallel.height));
         let area = normal[2];
         let rcp = one / area;
         let (edges, eps) = own_edges(groups, &seen, &[one; 3]);
@@ -306,7 +301,7 @@ impl Batch {
         nearest.store(&mut planes.nearest);
         farthest.store(&mut planes.farthest);
 
-        let all = (1u32 << self.len) - 1;
+        let all = self.lanes();
         let tells = V::splat(LEAST_VOLUME).cmp_le(size) & (sum(normal) * V::splat(LEAST_PART)).cmp_lt(size);
         planes.wild = all & !tells.bits();
         planes.edge_on = 0;

@@ -109,24 +109,46 @@ impl Slabs {
         bounds: &Aabb<f32>,
         wanted: u64,
     ) -> u64 {
-        let lo = each(|a| bounds.lo[a] - space.apex[a] - space.margin);
-        let hi = each(|a| bounds.hi[a] - space.apex[a] + space.margin);
-        let slopes = &mut self.slopes[usize::from(space.to_local.is_some())];
-        if groups.frame.parallel.is_none() {
-            slopes.prepare(groups, bundle, space, wanted & !slopes.ready);
+        if groups.frame.parallel.is_some() {
+            return self.test_along(groups, space, bounds, wanted);
         }
-        let met = match (&groups.frame.parallel, spans.backwards()) {
-            (Some(parallel), _) => parallel.met(groups, space.apex, [lo, hi], wanted),
-            (None, Some(backwards)) => {
+        let slopes = &mut self.slopes[usize::from(space.to_local.is_some())];
+        slopes.prepare(groups, bundle, space, wanted & !slopes.ready);
+        let [lo, hi] = space.widened(bounds);
+        let met = match spans.backwards() {
+            Some(backwards) => {
                 let near = each(|a| if backwards[a] { hi[a] } else { lo[a] });
                 let far = each(|a| if backwards[a] { lo[a] } else { hi[a] });
                 slopes.met::<true>(groups, near, far, wanted)
             }
-            (None, None) => slopes.met::<false>(groups, lo, hi, wanted),
+            None => slopes.met::<false>(groups, lo, hi, wanted),
         };
+        self.learn_of(wanted, met);
+        met
+    }
+
+    /// The same of rays of one direction.
+    #[inline(never)]
+    fn test_along(&mut self, groups: &Groups, space: &Space, bounds: &Aabb<f32>, wanted: u64) -> u64 {
+        let parallel = groups.frame.parallel.unwrap_or_default();
+        let met = parallel.met(groups, space.apex, space.widened(bounds), wanted);
+        self.learn_of(wanted, met);
+        met
+    }
+
+    /// Of the `wanted` groups those that `met` a box went on.
+    #[inline(always)]
+    fn learn_of(&mut self, wanted: u64, met: u64) {
         let (tested, culled) = (wanted.count_ones() as i32, (wanted & !met).count_ones() as i32);
         self.add(SAVED * culled - COST * (tested + 1));
-        met
+    }
+}
+
+impl Space<'_> {
+    /// The corners of a box as seen from the apex, moved outwards.
+    #[inline(always)]
+    fn widened(&self, bounds: &Aabb<f32>) -> [[f32; 3]; 2] {
+        [each(|a| bounds.lo[a] - self.apex[a] - self.margin), each(|a| bounds.hi[a] - self.apex[a] + self.margin)]
     }
 }
 

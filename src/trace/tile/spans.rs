@@ -35,8 +35,6 @@ pub struct Spans {
     /// What is added to either: of rays of one direction where they are, else nothing; infinite where nothing is said.
     before: [[f32; SETS]; 3],
     beyond: [[f32; SETS]; 3],
-    /// Rays go from this depth on.
-    first: f32,
 }
 
 /// Depth per unit of the near plane's distance and the far plane's, for components of directions over some rectangles; and which of
@@ -73,6 +71,7 @@ impl Ends {
 impl Spans {
     /// Those of rays of one direction, which have another place each: a point at (s, t) is, at the depth z away from where the tile is
     /// seen, `columns` times s, t and -z from the apex.
+    #[inline(never)]
     fn of_direction<const N: usize>(groups: &Groups, frame: &Frame, columns: [[f32; 3]; 3], margin: f32) -> Self {
         let [u, v, a] = columns;
         let sum = |n: [f32; 3]| n[0].abs() + n[1].abs() + n[2].abs();
@@ -84,7 +83,6 @@ impl Spans {
             far: [[0.0; SETS]; 4],
             before: [[f32::NEG_INFINITY; SETS]; 3],
             beyond: [[f32::INFINITY; SETS]; 3],
-            first: f32::NEG_INFINITY,
         };
         let ends: [[[f32; SETS]; 2]; 2] = groups.of_sets.map(|sides| {
             sides.map(|side| {
@@ -135,8 +133,7 @@ impl Spans {
         let margin = each(|x| (0..3).map(|k| columns[k][x].abs() * rounding[k]).sum::<f32>());
         let (near, far) = (bytemuck::cast(near.to_array()), bytemuck::cast(far.to_array()));
         let backwards: [bool; 3] = each(|axis| all(backwards, axis));
-        let mut spans =
-            Self { backwards, margin, near, far, before: [[0.0; SETS]; 3], beyond: [[0.0; SETS]; 3], first: 0.0 };
+        let mut spans = Self { backwards, margin, near, far, before: [[0.0; SETS]; 3], beyond: [[0.0; SETS]; 3] };
         let is_finite = columns.as_flattened().iter().all(|x| x.is_finite());
         for axis in (0..3).filter(|&axis| !(is_finite && (all(forwards, axis) || backwards[axis]))) {
             (spans.near[axis], spans.far[axis]) = ([0.0; SETS], [0.0; SETS]);
@@ -151,9 +148,9 @@ impl Spans {
         self.beyond.iter().all(|beyond| *beyond == [0.0; SETS]).then_some(self.backwards)
     }
 
-    /// Which of a node's boxes, as seen from the apex, the `N` sets may meet.
+    /// Which of a node's boxes, as seen from the apex, the `N` sets may meet. `ALONG`: of rays of one direction.
     #[inline(always)]
-    pub fn met<const N: usize>(&self, lo: &Lanes3<Children>, hi: &Lanes3<Children>) -> Met {
+    pub fn met<const N: usize, const ALONG: bool>(&self, lo: &Lanes3<Children>, hi: &Lanes3<Children>) -> Met {
         let splat = <Children as Lanes>::splat;
         let near: Lanes3<Children> = each(|a| {
             let (plane, margin) = if self.backwards[a] { (hi[a], self.margin[a]) } else { (lo[a], -self.margin[a]) };
@@ -165,9 +162,16 @@ impl Spans {
         });
         let mut met = 0;
         for q in 0..N {
-            let enter = |a: usize| near[a].mul_add(splat(self.near[a][q]), splat(self.before[a][q]));
-            let leave = |a: usize| far[a].mul_add(splat(self.far[a][q]), splat(self.beyond[a][q]));
-            let enter = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(splat(self.first)));
+            let enter = |a: usize| match ALONG {
+                true => near[a].mul_add(splat(self.near[a][q]), splat(self.before[a][q])),
+                false => near[a] * splat(self.near[a][q]),
+            };
+            let leave = |a: usize| {
+                let beyond = if ALONG { self.beyond[a][q] } else { self.beyond[a][0] };
+                far[a].mul_add(splat(self.far[a][q]), splat(beyond))
+            };
+            let first = if ALONG { f32::NEG_INFINITY } else { 0.0 };
+            let enter = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(splat(first)));
             let leave = leave(0).fast_min(leave(1)).fast_min(leave(2));
             met |= u64::from(!leave.cmp_lt(enter).bits() & 0xffff) << (SET * q);
         }
@@ -225,7 +229,11 @@ mod tests {
             let planes = |end: usize| {
                 each(|a| Children::load(&std::array::from_fn::<_, 16, _>(|k| boxes[k % boxes.len()][end][a])))
             };
-            let met = spans.met::<SETS>(&planes(0), &planes(1));
+            let (lo, hi) = (planes(0), planes(1));
+            let met = match parallel {
+                Some(_) => spans.met::<SETS, true>(&lo, &hi),
+                None => spans.met::<SETS, false>(&lo, &hi),
+            };
             for (child, [lo, hi]) in boxes.iter().enumerate() {
                 for (q, set) in sets.iter().enumerate() {
                     let said = groups_of(met, child) >> (SET * q) & 0xffff;
@@ -267,6 +275,6 @@ mod tests {
         assert_eq!(spans.backwards(), None);
         let zero = each(|_| <Children as Lanes>::splat(-1.0));
         let children = (1u64 << Children::N) - 1;
-        assert_eq!(spans.met::<1>(&zero, &zero) & children, children);
+        assert_eq!(spans.met::<1, false>(&zero, &zero) & children, children);
     }
 }

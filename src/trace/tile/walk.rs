@@ -4,6 +4,7 @@
 use super::batch::BATCH;
 use super::exact::Exact;
 use super::fine;
+use super::gaps::Trial;
 use super::groups::Groups;
 use super::node::{self, Level, Planes, WIDTH, key, slot};
 use super::pairs::flush;
@@ -64,6 +65,8 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
     counters: &mut Counters,
 ) {
     memory.batch.clear();
+    memory.kept.clear();
+    memory.trial = Trial::default();
     memory.slabs.start();
     let frame = &memory.groups.frame;
     let slack = memory.groups.slack / frame.scale;
@@ -83,7 +86,10 @@ pub fn walk<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: boo
         descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &leaves, groups, counters);
     }
     if memory.batch.len() > 0 {
-        flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
+        flush::<N, ANY, EXACT, COUNT>(memory, exact, counters, false);
+    }
+    if memory.kept.len() > 0 {
+        flush::<N, ANY, EXACT, COUNT>(memory, exact, counters, true);
     }
 }
 
@@ -221,7 +227,7 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
             counters.leaves += 1;
         }
         if memory.batch.len() + count > BATCH {
-            flush::<N, ANY, EXACT, COUNT>(memory, exact, counters);
+            flush::<N, ANY, EXACT, COUNT>(memory, exact, counters, false);
         }
         let block = &self.object.triangles[leaf.index as usize];
         match self.place {
