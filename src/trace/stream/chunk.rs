@@ -55,6 +55,8 @@ pub struct Chunk<S> {
     pub dominant: [Set; 3],
     /// Whether some ray may be [`Triangle::along_a_face`].
     pub flat: bool,
+    /// Rays of which the sieve is sure of nothing: those with an infinite [`Line::gauge`].
+    pub common: Set,
     /// Whether some `shift` is too large to compute with.
     pub steep: bool,
     /// Sum of the directions (closest-hit, of at least [`DENSE`] rays with `bounds`).
@@ -63,7 +65,8 @@ pub struct Chunk<S> {
     pub len: usize,
     /// Bounds over all of them, if they are of one octant.
     pub bounds: Option<Bounds<S>>,
-    /// Whether there is what the common formula needs beside: `around`, `shear`, `axis` and `dominant`.
+    /// Whether there is what the common formula needs beside: `around`, `shear`, `axis` and `dominant`. Where `common` rays are, there
+    /// always is.
     pub sheared: bool,
     /// Whether they go together whatever their octants.
     pub mixed: bool,
@@ -89,6 +92,7 @@ impl<S: Real> Default for Chunk<S> {
             axis: [0; RAYS],
             dominant: [0; 3],
             flat: false,
+            common: 0,
             steep: false,
             mean: [S::ZERO; 3],
             len: 0,
@@ -158,7 +162,7 @@ impl<S: Real> Chunk<S> {
     pub fn start(&mut self, len: usize, sheared: bool) {
         (self.len, self.bounds, self.region) = (len.min(RAYS), None, None);
         self.sheared = sheared;
-        (self.mixed, self.flat, self.steep) = (false, false, false);
+        (self.mixed, self.flat, self.steep, self.common) = (false, false, false, 0);
     }
 
     /// Takes in a vector of rays, of which those of `live` matter.
@@ -199,13 +203,30 @@ impl<S: Real> Chunk<S> {
         let [x, y, z] = map3(product, |x| x.abs().cmp_le(most));
         self.steep |= !(x & y & z).bits() & live != 0;
         self.flat |= Triangle::along_a_face(packet.dir).bits() & live != 0;
-        gauge(packet.org, packet.dir).store(&mut self.gauge[at..]);
+        let gauge = gauge(packet.org, packet.dir);
+        gauge.store(&mut self.gauge[at..]);
+        let common = V::splat(V::Scalar::MAX).cmp_lt(gauge).bits() & live;
+        self.common |= Set::from(common) << at;
         let from_start = packet.t_floor.cmp_lt(packet.t_min);
         V::select(from_start, packet.t_min, V::splat(V::Scalar::LOWEST)).store(&mut self.t_low[at..]);
         packet.t_floor.store(&mut self.t_floor[at..]);
-        if !self.sheared {
-            return;
+        if self.sheared {
+            self.put_shear(at, packet);
+        } else if common != 0 {
+            self.make_shear(at, packet);
         }
+    }
+
+    /// Works out what the common formula needs of a vector of rays that come without it.
+    #[cold]
+    #[inline(never)]
+    fn make_shear<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>) {
+        self.put_shear(at, &Packet::new(packet.org, packet.dir, packet.t_min));
+    }
+
+    /// Puts in what the common formula needs beside.
+    #[inline(always)]
+    fn put_shear<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>) {
         store3(packet.shear, &mut self.shear, at);
         let dominant = map3(packet.dominant, V::Mask::from_bits);
         let turned = each(|axis| around(packet.org, axis));

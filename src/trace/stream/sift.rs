@@ -181,3 +181,66 @@ pub fn doubtful<S: Real, const ANY: bool>(
         best.take(ray, wanted, &found, &block.prim, inst);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Job, Memory};
+    use crate::lanes::{Lanes, Real, f32x16, f64x8};
+    use crate::math::Random;
+    use crate::ray::{Counters, Hits, Rays};
+    use crate::scene::load::{LoadOptions, load};
+    use crate::scene::world::{Preset, World};
+    use crate::trace::output::Output;
+    use crate::trace::{Engines, Scratch, engine};
+
+    /// Rays along axes among others, with the plain test: those have the hits of the common formula, and the sieve is not asked.
+    fn along_axes<V: Lanes>()
+    where
+        V::Scalar: Engines,
+    {
+        let scene = load("builtin:terrain", &LoadOptions::default()).unwrap();
+        let world = World::<V::Scalar>::compile(&scene, Preset::Balanced).unwrap();
+        let (number, zero) = (V::Scalar::from_f64, V::Scalar::ZERO);
+        let (mut r, mut rays) = (Random(5), Rays::<V::Scalar>::new(3000));
+        for i in 0..rays.len() {
+            let mut unit = || 2.0 * r.unit() - 1.0;
+            let (org, mut dir) = ([5.0 * unit(), 3.0 * unit(), 5.0 * unit()], [unit(), unit(), unit()]);
+            if i % 3 != 0 {
+                dir[i % 2] = 0.0;
+            }
+            if i % 3 == 2 {
+                dir[2] = 0.0;
+            }
+            rays.set(i, org.map(number), dir.map(number), zero, V::Scalar::INFINITY);
+        }
+        let flat = |i: usize| rays.dir(i).contains(&zero);
+        let (mut want, mut hits, mut scratch) = (Hits::default(), Hits::default(), Scratch::default());
+        engine::<V::Scalar>("scalar").unwrap().intersect(&world, &rays, &mut want, &mut scratch, None);
+        hits.prepare(rays.len());
+        let crate::trace::Memory { stack, .. } = V::Scalar::memory(&mut scratch);
+        stack.reserve(world.stack_bound());
+        let (mut memory, mut counters) = (Memory::default(), Counters::default());
+        let output = Output::Closest(&mut hits, world.names.as_ref());
+        let (world, rays, memory) = (&world, &rays, &mut memory);
+        let mut job = Job { world, rays, memory, stack, counters: &mut counters, output, apart: true, plain: true };
+        job.run::<V, false, false>((0..rays.padded_len()).step_by(V::N));
+        let chunk = &job.memory.chunk;
+        for i in 0..chunk.len {
+            let dir = [0, 1, 2].map(|a| chunk.dir[a][i]);
+            assert_eq!(chunk.common >> i & 1 != 0, dir.contains(&zero), "{dir:?}");
+        }
+        let of = |hits: &Hits<V::Scalar>, i: usize| (hits.t[i], hits.u[i], hits.v[i], hits.prim[i], hits.inst[i]);
+        let mut met = 0;
+        for i in (0..rays.len()).filter(|&i| flat(i)) {
+            assert_eq!(of(&hits, i), of(&want, i), "ray {i}");
+            met += usize::from(want.t[i] < V::Scalar::INFINITY);
+        }
+        assert!(met > 200, "{met} rays along faces hit something");
+    }
+
+    #[test]
+    fn rays_along_axes_have_the_common_formula() {
+        along_axes::<f32x16>();
+        along_axes::<f64x8>();
+    }
+}
