@@ -52,10 +52,13 @@ pub struct Line {
     pub hits: u64,
     /// Judged by the oracle.
     pub oracle: Counts,
-    /// Rays whose bits differ from the `scalar` engine's; not counted for engines with an arithmetic of their own.
-    pub bit_differences: u64,
+    /// Rays whose bits differ from the `scalar` engine's, which none may; `None` for engines with an arithmetic of their own.
+    pub bit_differences: Option<u64>,
     /// The first of them, with both answers.
     pub first_difference: Option<String>,
+    /// The same of engines with an arithmetic of their own, whose bits may differ: what is wrong among them, the oracle finds. `None`
+    /// for the others.
+    pub own_differences: Option<u64>,
     /// Rays whose bits change when the same rays come in another order and in other batches (engines with an arithmetic
     /// of their own: the same batches in another order).
     pub order_differences: u64,
@@ -66,7 +69,7 @@ pub struct Line {
 impl Line {
     /// Whether nothing is wrong.
     pub fn passes(&self) -> bool {
-        self.oracle.unexplained == 0 && self.bit_differences == 0 && self.order_differences == 0
+        self.oracle.unexplained == 0 && self.bit_differences.unwrap_or(0) == 0 && self.order_differences == 0
     }
 }
 
@@ -144,8 +147,9 @@ impl<S: Engines> Bench<'_, S> {
                 rays,
                 hits: 0,
                 oracle: Counts::default(),
-                bit_differences: 0,
+                bit_differences: engine.is_exact().then_some(0),
                 first_difference: None,
+                own_differences: None,
                 order_differences: 0,
                 skipped: None,
             };
@@ -163,12 +167,14 @@ impl<S: Engines> Bench<'_, S> {
                 None => judged.clone(),
                 Some(_) => self.judge(truth::margin_factor(engine), batches, &answers),
             };
+            let count = difference.as_ref().map_or(0, |d| d.count);
             if engine.is_exact() {
-                line.bit_differences = difference.as_ref().map_or(0, |d| d.count);
+                line.bit_differences = Some(count);
                 line.first_difference = difference.map(|d| format!("ray {}: {}", d.first, d.text));
                 let reordered = self.answers(engine, query, &shuffled.batches);
                 line.order_differences = shuffled.differences(&answers, &reordered);
             } else {
+                line.own_differences = Some(count);
                 line.order_differences = self.backwards(engine, query, batches, &answers);
             }
             report(line);
