@@ -159,6 +159,42 @@ fn a_mesh_stands_beside_its_solid() {
     assert_eq!(verified.code, Some(0), "{}{}", verified.out, verified.err);
 }
 
+/// Corners of all triangles of a scene of meshes, as OBJ has them.
+fn corners(dir: &Path, scene: &str) -> Vec<[String; 3]> {
+    let ended = lanecast(dir, &["convert", scene, "-o", "read.obj"]);
+    assert_eq!(ended.code, Some(0), "{scene}: {}", ended.err);
+    let text = std::fs::read_to_string(dir.join("read.obj")).expect("a mesh");
+    let lines = |start: &'static str| text.lines().filter_map(move |line| line.strip_prefix(start));
+    let vertices: Vec<&str> = lines("v ").collect();
+    let corner = |word: &str| vertices[word.parse::<usize>().expect("a number") - 1].to_string();
+    let triangle = |line: &str| line.split(' ').map(corner).collect::<Vec<_>>().try_into().expect("three corners");
+    lines("f ").map(triangle).collect()
+}
+
+/// Meshes change their format and nothing else; instances are where they are placed.
+#[test]
+fn loose_meshes_are_written_as_they_are() {
+    let dir = tempfile::tempdir().expect("a folder");
+    std::fs::write(dir.path().join("square.ply"), SQUARE).expect("a mesh");
+    let want = corners(dir.path(), "square.ply");
+    assert!(!want.is_empty());
+    for (from, to) in [("square.ply", "a.obj"), ("a.obj", "b.stl"), ("b.stl", "c.ply")] {
+        let ended = lanecast(dir.path(), &["convert", from, "-o", to, "--json"]);
+        assert_eq!(ended.code, Some(0), "{from}: {}", ended.err);
+        assert_eq!(ended.json()["triangles"], want.len(), "{from}");
+        assert_eq!(corners(dir.path(), to), want, "{from} to {to}");
+    }
+    let scene = "define \"s\" { mesh \"square.ply\" }\ninstance \"s\"\ninstance \"s\" { scale 2; translate 10 0 0 }\n";
+    std::fs::write(dir.path().join("two.kdl"), scene).expect("a scene");
+    let two = corners(dir.path(), "two.kdl");
+    assert_eq!(two.len(), 2 * want.len());
+    let numbers = |v: &str| v.split(' ').map(|x| x.parse().expect("a number")).collect::<Vec<f64>>();
+    for (own, placed) in two[..want.len()].iter().flatten().zip(two[want.len()..].iter().flatten()) {
+        let (own, placed) = (numbers(own), numbers(placed));
+        assert_eq!([placed[0], placed[1], placed[2]], [2.0 * own[0] + 10.0, 2.0 * own[1], 2.0 * own[2]]);
+    }
+}
+
 #[test]
 fn other_kinds_of_scenes() {
     let dir = folder();
@@ -212,7 +248,9 @@ fn refusals_leave_no_files() {
         ("convert block.kdl --solid block -o a.stl --cells 2000 --memory 100", "--cells"),
         ("convert block.kdl --solid block -o a.npy --cells 20", "--voxels"),
         ("convert block.kdl --solid block -o a.npy --voxels 20 --tolerance 0.1", "cannot be used with"),
-        ("convert mesh.ply -o a.stl", "is a solid"),
+        ("convert mesh.ply -o a.npy", "is a solid"),
+        ("convert mesh.ply -o a.stl --cells 20", "they become .stl, .obj or .ply as they are"),
+        ("convert mesh.ply -o a.stl --memory 0", "1 MiB: more than --memory"),
         ("convert none.kdl -o a.stl", "none.kdl"),
         ("convert block.kdl --solid block -o no/such/a.stl", "a.stl"),
     ] {

@@ -1,4 +1,4 @@
-//! `lanecast convert`: solids as a closed mesh or as voxels.
+//! `lanecast convert`: solids as a closed mesh or as voxels; meshes in another format.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::common::{OutputArgs, SceneArgs, ThreadArgs, with_pool};
 use super::interrupt::stopped;
 use super::output::{json_to_stdout, to_stdout};
-use crate::convert::{Distances, Fineness, Grid, Solids, Topology, Voxels, Wanted, Watch, surface, voxels};
+use crate::convert::{Distances, Fineness, Grid, Placed, Solids, Topology, Voxels, Wanted, Watch, surface, voxels};
 use crate::error::{Error, Result};
 use crate::film::mesh::{MeshKind, write_mesh};
 use crate::film::{check_apart, check_file, npy};
@@ -27,12 +27,16 @@ Examples:
   lanecast convert builtin:bolt --solid bolt -o blocks.ply --voxels 64
   lanecast convert moss.asc --top all.g -o moss.stl
   lanecast render bolt.stl -o bolt.png          the mesh, to compare with the solid
+  lanecast convert model.ply -o model.stl       triangles as they are, in another format
 
 What is converted: trees of solids (union, intersection, difference, xor), spheres, boxes, cylinders and cones, all \
 of them together as one solid; with --solid only those trees and `define`s. Loose meshes and discs have no inside \
 and are left out; planes have no bounds and are refused, so scenes with a ground plane want --solid.
 
-A mesh is closed and a manifold, which is checked before it is written: every edge is in two triangles. Edges and \
+A scene of nothing but meshes is written as it is, without --solid, --tolerance, --cells and --voxels: all triangles, \
+those of instances in their places, as positions only (no normals, texture coordinates or materials), closed or not.
+
+A mesh of solids is closed and a manifold, which is checked before it is written: every edge is in two triangles. Edges and \
 corners stay sharp. The first grid has cells of four times the tolerance (16 to 64 along the longest side); they are \
 halved until no distance measured between mesh and solid, either way, is larger than the tolerance; the largest ones \
 are printed. Parts thinner than a cell can be missed: a smaller --tolerance or more --cells finds them. Vertices are \
@@ -94,6 +98,18 @@ struct MeshReport<'a> {
     distance_of_solid: Option<f64>,
 }
 
+/// The object of `--json` for meshes that are written as they are.
+#[derive(Serialize)]
+struct PlacedReport<'a> {
+    scene: &'a str,
+    output: &'a Path,
+    /// Meshes placed, also of the same one.
+    meshes: usize,
+    triangles: usize,
+    vertices: usize,
+    area: f64,
+}
+
 /// The object of `--json` for voxels.
 #[derive(Serialize)]
 struct VoxelReport<'a> {
@@ -125,6 +141,12 @@ pub fn run(args: &ConvertArgs) -> Result<()> {
     check_apart(&args.file, &[Path::new(&args.scene.scene)])?;
     let description = args.scene.load(&args.output)?;
     check_apart(&args.file, &description.inputs())?;
+    let as_it_is = args.solid.is_empty() && args.tolerance.is_none() && args.cells.is_none() && args.voxels.is_none();
+    if let Some(kind) = kind.filter(|_| as_it_is)
+        && let Some(found) = Placed::new(&description, args.memory.saturating_mul(1 << 20))?
+    {
+        return placed(args, kind, &found);
+    }
     with_pool(args.threads.count(), || {
         let solids = Solids::new(&description, &args.solid)?;
         if solids.left_out > 0 {
@@ -191,6 +213,25 @@ struct Made {
     grid: Grid,
     topology: Topology,
     distances: Option<Distances>,
+}
+
+fn placed(args: &ConvertArgs, kind: MeshKind, found: &Placed) -> Result<()> {
+    let Placed { mesh, meshes } = found;
+    write_mesh(&args.file, kind, mesh, &format!("lanecast convert {}", args.scene.scene))?;
+    let report = PlacedReport {
+        scene: &args.scene.scene,
+        output: &args.file,
+        meshes: *meshes,
+        triangles: mesh.triangles.len(),
+        vertices: mesh.positions.len(),
+        area: mesh.area(),
+    };
+    if args.output.json {
+        return json_to_stdout(&report);
+    }
+    let PlacedReport { triangles, vertices, area, .. } = report;
+    let name = args.file.display();
+    to_stdout(&format!("{name}\ntriangles {triangles}, vertices {vertices}; of {meshes} meshes, area {area:.6e}\n"))
 }
 
 fn mesh(args: &ConvertArgs, kind: MeshKind, mesh: &Mesh, made: &Made, tolerance: f64) -> Result<()> {

@@ -61,7 +61,10 @@ impl Solids {
         }
         let Some((lo, hi)) = world.bounds() else {
             let hint = "closed shapes and union, intersection, difference or xor of them are";
-            return Err(Error::Usage(format!("nothing in the scene is a solid: {hint}, loose triangles are not")));
+            let but = "alone and without --solid, --tolerance, --cells or --voxels they become .stl, .obj or .ply as they are";
+            return Err(Error::Usage(format!(
+                "nothing in the scene is a solid: {hint}, loose triangles are not ({but})"
+            )));
         };
         Ok(Self { world, lo, hi, left_out })
     }
