@@ -114,6 +114,30 @@ fn memory_stays_in_proportion_to_the_file() {
     }
     lies_reserve_nothing();
     dense_files_stay_below_the_stated_bounds();
+    curves_take_what_their_triangles_take();
+}
+
+/// A few words may ask for millions of triangles: for each less than the 512 bytes that the reader states, and not for more than 2^22.
+fn curves_take_what_their_triangles_take() {
+    for (pieces, words) in [
+        (800_u64, "sphere($fn=800);".to_owned()),
+        (800, "linear_extrude(height=1,twist=9,slices=400)circle($fn=800);".to_owned()),
+        (
+            800,
+            "rotate_extrude($fn=400)multmatrix([[1,0,0,3],[0,1,0,0],[0,0,1,0],[0,0,0,1]])circle($fn=800);".to_owned(),
+        ),
+        (800, "cylinder(h=1,r=1,$fn=60000);sphere($fn=800);".to_owned()),
+    ] {
+        let (_, touched, is_read) = rise("curve.csg", words.as_bytes());
+        let each = touched / (pieces * pieces);
+        println!("{words}: {each} bytes per triangle, stated: below 512");
+        assert!(is_read && (1..512).contains(&each), "{words}: {each}");
+    }
+    // One more piece than fits, in one mesh and in many.
+    for words in ["sphere($fn=2050);".to_owned(), "sphere($fn=4000);".to_owned(), "sphere(r=1,$fn=64);".repeat(1100)] {
+        let (_, touched, is_read) = rise("curve.csg", words.as_bytes());
+        assert!(!is_read && touched < 16 << 20, "{}: {touched} bytes", &words[..16]);
+    }
 }
 
 fn lies_reserve_nothing() {

@@ -6,7 +6,7 @@
 //! (`extrude`).
 //!
 //! Nothing recurses over what a file says, and what it may cost is counted (`work`). Memory stays below 256 bytes per
-//! byte of the file while it is read.
+//! byte of the file, and 512 bytes per triangle of the meshes that the file asks for: a few words may ask for 2^22, 2 GiB.
 
 mod build;
 mod cover;

@@ -14,7 +14,7 @@ fn hostile_files_end_soon() {
     assert_eq!(flat(&differences).steps.iter().filter(|step| matches!(step, Step::Op(..))).count(), depth);
     let resizes = format!("{}{}{}", "resize([1,1,1]) {".repeat(depth), "cube();".repeat(depth), "}".repeat(depth));
     assert!(refused(&resizes).contains("too much work"));
-    assert!(refused("sphere(r = 1, $fn = 5000);").contains("more than 16777216 triangles"));
+    assert!(refused("sphere(r = 1, $fn = 5000);").contains("more than 4194304 triangles"));
     // Each edge crosses each other.
     let star: Vec<String> =
         (0..4001).map(|i| format!("[{},{}]", if i % 2 == 0 { 0 } else { 9999 }, i * 2003 % 4001)).collect();
