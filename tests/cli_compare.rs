@@ -211,6 +211,13 @@ fn what_does_not_compare_is_refused() {
     npy::write_plane(&at.join("small.npy"), 3, 3, &film.planes[0].data).expect("written");
     let sizes = lanecast(at, &["compare", "half.exr", "small.npy"]);
     assert!(sizes.code == Some(1) && sizes.err.contains("16x12 and 3x3"), "{}", sizes.err);
+    // That is a comparison that fails, and no bad input.
+    let said = lanecast(at, &["compare", "half.exr", "small.npy", "--json"]);
+    let report = said.json();
+    assert_eq!((said.code, &report["pass"], &report["kind"]), (Some(1), &false.into(), &"pictures".into()));
+    assert_eq!(report["sizes"], serde_json::json!([[16, 12], [3, 3]]));
+    let why = report["failures"][0].as_str().expect("a reason");
+    assert_eq!(why, "pictures of different sizes: 16x12 and 3x3");
 }
 
 /// Options of scenes, of files without a size and of heat maps mean nothing to other pictures, which need not be opened for that.

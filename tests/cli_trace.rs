@@ -113,6 +113,36 @@ fn the_checksum_is_that_of_the_hit_file_whatever_the_engine_and_threads() {
     assert_eq!(sums, vec![serde_json::Value::from(format!("{fnv:016x}")); 3]);
 }
 
+/// All stretches through a ball: the keys of the other queries, counted by rays, and the checksum of the file.
+#[test]
+fn stretches_have_the_agreed_keys_too() {
+    let dir = square();
+    std::fs::write(dir.path().join("ball.kdl"), "union \"ball\" { sphere radius=1 }\n").expect("a scene");
+    let line = "trace ball.kdl --rays rays.npy --query all --repeat 1 --hits all.npy --json";
+    let mut said = Vec::new();
+    for threads in ["1", "2"] {
+        let ended = lanecast(dir.path(), &[&line.split(' ').collect::<Vec<_>>()[..], &["--threads", threads]].concat());
+        assert_eq!(ended.code, Some(0), "{}", ended.err);
+        said.push(ended.json());
+    }
+    let report = &said[0];
+    // The first ray and the fourth go through; the third ends inside, half a unit from where it enters and more.
+    assert_eq!((&report["hits"], &report["stretches"], &report["rays"]), (&3.into(), &3.into(), &6.into()));
+    for key in ["mrays_per_s", "bytes", "seconds", "checksum", "isa", "build_seconds"] {
+        assert!(!report[key].is_null(), "{key}: {report}");
+    }
+    let total = report["bytes"]["nodes"].as_u64().zip(report["bytes"]["primitives"].as_u64()).map(|(a, b)| a + b);
+    assert_eq!(report["bytes"]["total"].as_u64(), total);
+    let bytes = std::fs::read(dir.path().join("all.npy")).expect("stretches");
+    let fnv = npy_parts(&bytes)
+        .1
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325u64, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    for report in &said {
+        assert_eq!(report["checksum"], format!("{fnv:016x}"));
+    }
+}
+
 #[test]
 fn errors_leave_no_files() {
     let dir = square();

@@ -10,7 +10,7 @@ use super::common::{OutputArgs, SceneOptions, ThreadArgs, finite, size, with_poo
 use super::output::{json_to_stdout, to_stdout};
 use crate::error::{Error, Result};
 use crate::film::metrics::Viewing;
-use crate::film::picture;
+use crate::film::picture::{self, Picture};
 use crate::film::{check_apart, check_distinct, check_file, npy};
 use crate::measure::hitfiles::{self, FileAnswers, HitReport};
 use crate::measure::pictures::{self, Options, PictureReport};
@@ -141,6 +141,13 @@ struct Report<'a> {
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum Found<'a> {
     Pictures(&'a PictureReport),
+    /// Whose pixels are not the same ones: there are no figures.
+    #[serde(rename = "pictures")]
+    Apart {
+        /// Width and height of both, and where that is in the whole pictures: x0, y0, x1, y1.
+        sizes: [[u32; 2]; 2],
+        windows: [[u32; 4]; 2],
+    },
     Hits(&'a HitReport),
 }
 
@@ -169,11 +176,24 @@ fn images(args: &CompareArgs) -> Result<()> {
     let (a, b) = (picture::read(&args.a, args.size)?, picture::read(&args.b, args.size)?);
     let viewing = args.ppd.map_or_else(Viewing::default, |pixels_per_degree| Viewing { pixels_per_degree });
     let options = Options { exposure: args.exposure.unwrap_or(0.0), peak: args.peak.map(f64::from), viewing };
-    let (report, maps) = pictures::compare(&a, &b, &options)?;
+    let (report, maps) = match pictures::compare(&a, &b, &options) {
+        Err(Error::Mismatch(what)) => return apart(args, [&a, &b], what),
+        compared => compared?,
+    };
     // A limit on what these pictures have not is refused: before anything is written.
     let failures = args.limits.of_pictures(&report)?;
     difference::write(args, (&a, &b), maps.as_ref())?;
     finish(args, Found::Pictures(&report), failures, || table::pictures(&report))
+}
+
+/// Says that the pixels of two pictures are not the same ones, which is a failure and no bad input.
+fn apart(args: &CompareArgs, of: [&Picture; 2], what: String) -> Result<()> {
+    if args.output.json {
+        let windows = of.map(|p| [p.film.window.x0, p.film.window.y0, p.film.window.x1, p.film.window.y1]);
+        let found = Found::Apart { sizes: of.map(|p| [p.film.window.width(), p.film.window.height()]), windows };
+        json_to_stdout(&Report { a: &args.a, b: &args.b, pass: false, failures: vec![what.clone()], found })?;
+    }
+    Err(Error::Mismatch(what))
 }
 
 fn hits(args: &CompareArgs, a: &FileAnswers, b: &FileAnswers) -> Result<()> {

@@ -117,7 +117,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "PIXELS", default_value_t = 32)]
     tile: u32,
     /// Frames of an animation, both ends included: the scene's parameter `frame` is set to each, and NAME.0001.exr and so
-    /// on are written; a frame that is stopped is not
+    /// on are written; a frame that is stopped is not. --json says in one object, when all are done, what was said of each
     #[arg(long, value_name = "A..B", value_parser = frames::frames)]
     frames: Option<frames::Frames>,
     /// Keep finished tiles beside the picture, in NAME.tiles, until it is whole, and go on from those that the same command left there
@@ -219,7 +219,7 @@ fn still(args: &RenderArgs, description: &Description, options: &RenderOptions) 
 fn compiled<S: Shades>(args: &RenderArgs, description: &Description, options: &RenderOptions) -> Result<()> {
     args.engine.find::<S>()?;
     let world = World::<S>::compile(description, args.scene.options.build())?;
-    picture(args, description, options, &world, true)
+    picture(args, description, options, &world, None)
 }
 
 /// Whether `rt`'s lighting model knows all that the scene asks of it; if `lenient`, what it does not know is said.
@@ -302,13 +302,13 @@ fn options(args: &RenderArgs) -> Result<RenderOptions> {
     Ok(options)
 }
 
-/// Renders and writes one picture. If `partly`, also one that was stopped, as far as it got.
+/// Renders and writes one picture, also one that was stopped, as far as it got; of the `frames` of an animation only whole ones.
 fn picture<S: Shades>(
     args: &RenderArgs,
     description: &Description,
     options: &RenderOptions,
     world: &World<S>,
-    partly: bool,
+    frames: Option<&mut Vec<serde_json::Value>>,
 ) -> Result<()> {
     let is_cost = options.integrator == Integrator::Cost;
     let engine = args.engine.for_costs(is_cost).for_blocks(args.preview.by_blocks()).find::<S>()?;
@@ -355,7 +355,7 @@ fn picture<S: Shades>(
         world_to_ndc: Some(camera.world_to_ndc().transpose().to_cols_array_2d()),
     };
     // Without a finished tile there is nothing to show, and an older picture is worth more.
-    let written = output.is_complete() || partly && output.tiles_done > 0;
+    let written = output.is_complete() || frames.is_none() && output.tiles_done > 0;
     if written {
         write_each(&args.files, &output.film, &info, args.exposure)?;
     }
@@ -365,7 +365,7 @@ fn picture<S: Shades>(
     let stats = world.stats();
     let (engine, precision, build_seconds) = (engine.name(), S::PRECISION, stats.build_seconds);
     let made = Made { engine, precision, build_seconds, holds: Holds::new(&stats, description), written };
-    tell(args, &report(args, options, &output, &made), &output)?;
+    tell(args, &report(args, options, &output, &made), &output, frames)?;
     if let Some(window) = window {
         window.wait(|| watch.stopped());
     }

@@ -21,7 +21,7 @@ use crate::measure::truth;
 use crate::ray::{Counters, Rays};
 use crate::reference::Oracle;
 use crate::scene::description::{Description, Precision};
-use crate::scene::world::World;
+use crate::scene::world::{World, WorldStats};
 use crate::trace::{Engine, Engines, engine};
 
 const EXAMPLES: &str = "\
@@ -158,6 +158,13 @@ struct Bytes {
     total: u64,
 }
 
+impl Bytes {
+    fn of(stats: &WorldStats) -> Self {
+        let (nodes, primitives) = (stats.node_bytes, stats.prim_bytes);
+        Self { nodes, primitives, total: nodes + primitives }
+    }
+}
+
 /// Runs `lanecast trace`.
 ///
 /// # Errors
@@ -210,11 +217,7 @@ fn trace<S: Engines>(args: &TraceArgs, query: Query, description: &Description, 
         mrays_per_s: Mrays { best: mrays(count, seconds.min), median: mrays(count, seconds.median) },
         seconds: Seconds { min: seconds.min, median: seconds.median, max: seconds.max },
         build_seconds: stats.build_seconds,
-        bytes: Bytes {
-            nodes: stats.node_bytes,
-            primitives: stats.prim_bytes,
-            total: stats.node_bytes + stats.prim_bytes,
-        },
+        bytes: Bytes::of(&stats),
         checksum: format!("{:016x}", answers.checksum()),
         solids: SolidCounts::of(&workers.count(engine, &world, &batches, query)),
     };

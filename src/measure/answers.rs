@@ -144,6 +144,13 @@ fn locate<B>(batches: &[B], len: impl Fn(&B) -> usize, mut ray: usize) -> Option
     None
 }
 
+/// [`Answers::checksum`] of other answers, given as the bytes of their file.
+pub fn checksum(bytes: impl Iterator<Item = u8>) -> u64 {
+    let mut hash = Fnv::default();
+    bytes.for_each(|byte| hash.bytes(&[byte]));
+    hash.0
+}
+
 struct Fnv(u64);
 
 impl Default for Fnv {

@@ -59,6 +59,16 @@ fn resume_leaves_out_what_is_there() {
     assert!(said.contains("out.0002.png: there already"), "{said}");
     assert_eq!(std::fs::read(&second).unwrap(), b"not a picture");
     assert_eq!(files(dir.path()).len(), 4);
+    // All that is said of them is one object.
+    std::fs::remove_file(dir.path().join("out.0003.png")).unwrap();
+    let said = render(dir.path(), "-o out.png --frames 1..3 --resume --json");
+    assert_eq!(said.out.lines().count(), 1, "{}", said.out);
+    let report = said.json();
+    assert_eq!(report["kept"], serde_json::json!(["out.0001.png", "out.0002.png"]));
+    let frames = report["frames"].as_array().unwrap();
+    assert_eq!((frames.len(), &frames[0]["file"], &frames[0]["complete"]), (1, &"out.0003.png".into(), &true.into()));
+    let none = render(dir.path(), "-o out.png --frames 1..3 --resume --json").json();
+    assert_eq!((&none["frames"], none["kept"].as_array().unwrap().len()), (&serde_json::json!([]), 3));
     render(dir.path(), "-o out.png --frames 1..3");
     assert!(std::fs::read(&second).unwrap() == whole, "without it all frames are made");
     // One frame is also a picture of its own.

@@ -2,9 +2,13 @@
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
-use super::{RenderArgs, check_rt, options, picture};
+use serde_json::Value;
+
+use super::{RenderArgs, check_rt, options, picture, report};
 use crate::cli::common::{SceneArgs, with_pool};
+use crate::cli::output::json_to_stdout;
 use crate::error::{Error, Result};
 use crate::scene::description::{Description, Precision};
 use crate::scene::kdl::FRAME;
@@ -39,11 +43,25 @@ fn numbered(path: &Path, frame: u32) -> PathBuf {
     path.with_extension(format!("{frame:04}.{extension}"))
 }
 
-/// Renders all frames. Meshes are read once, and objects that do not change from one frame to the next are built once.
+/// Renders all frames, and says in one object what was done.
 ///
 /// # Errors
 /// As [`super::run`]; a frame that is stopped is not written.
 pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
+    let (mut told, kept) = (Vec::new(), Mutex::new(Vec::new()));
+    let done = each(args, frames, &mut told, &kept);
+    if args.output.json && matches!(done, Ok(()) | Err(Error::Interrupted)) {
+        let kept = kept.into_inner().unwrap_or_default();
+        json_to_stdout(&report::Frames { scene: &args.scene.scene, kept: &kept, frames: &told })?;
+    }
+    done
+}
+
+/// Renders all frames. Meshes are read once, and objects that do not change from one frame to the next are built once.
+///
+/// # Errors
+/// As [`run`].
+fn each(args: &RenderArgs, frames: Frames, told: &mut Vec<Value>, kept: &Mutex<Vec<String>>) -> Result<()> {
     let options = options(args)?;
     let SceneArgs { scene, options: of_scene } = &args.scene;
     if !has_parameters(scene) {
@@ -77,6 +95,7 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
         let is_there = args.resume && of_frame.all_files(&options).iter().all(|file| file.exists());
         if is_there {
             args.output.say(&format!("{}: there already", of_frame.file()));
+            kept.lock().into_iter().for_each(|mut kept| kept.push(of_frame.file()));
         }
         !is_there
     };
@@ -90,8 +109,8 @@ pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {
     }
     let rest = wanted.map(describe);
     with_pool(args.threads.count(), || match args.scene.options.precision(&description) {
-        Precision::F32 => all::<f32>((of_first, description), rest, &options),
-        Precision::F64 => all::<f64>((of_first, description), rest, &options),
+        Precision::F32 => all::<f32>((of_first, description), rest, &options, told),
+        Precision::F64 => all::<f64>((of_first, description), rest, &options, told),
     })
 }
 
@@ -101,12 +120,13 @@ fn all<S: Shades>(
     first: Frame,
     rest: impl Iterator<Item = Result<Frame>>,
     options: &crate::render::RenderOptions,
+    told: &mut Vec<Value>,
 ) -> Result<()> {
     let mut before: Option<World<S>> = None;
     for frame in std::iter::once(Ok(first)).chain(rest) {
         let (args, description) = frame?;
         let world = World::<S>::compile_after(&description, args.scene.options.build(), before.as_ref())?;
-        picture(&args, &description, options, &world, false)?;
+        picture(&args, &description, options, &world, Some(&mut *told))?;
         before = Some(world);
     }
     Ok(())

@@ -1,10 +1,11 @@
 //! What `lanecast render` says when it is done.
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::RenderArgs;
 use crate::cli::output::json_to_stdout;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::lanes::compiled_isa;
 use crate::render::{RenderOptions, RenderOutput};
 use crate::scene::description::Description;
@@ -132,8 +133,23 @@ pub(super) fn report<'a>(
     }
 }
 
-/// What was done: one JSON object on stdout, or a few lines on stderr.
-pub(super) fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput) -> Result<()> {
+/// What `--json` says about an animation, when it is done or stopped.
+#[derive(Serialize)]
+pub(super) struct Frames<'a> {
+    pub scene: &'a str,
+    /// Files of frames that were there already.
+    pub kept: &'a [String],
+    /// What was said of each of the others.
+    pub frames: &'a [Value],
+}
+
+/// What was done: a few lines on stderr and one JSON object, on stdout or, of a frame, in the list of all.
+pub(super) fn tell(
+    args: &RenderArgs,
+    report: &Report<'_>,
+    output: &RenderOutput,
+    frames: Option<&mut Vec<Value>>,
+) -> Result<()> {
     let (file, (width, height), rays) = (&report.file, report.size, &report.rays);
     let (done, total) = report.tiles;
     let part = match (report.complete, done) {
@@ -172,7 +188,12 @@ pub(super) fn tell(args: &RenderArgs, report: &Report<'_>, output: &RenderOutput
     if args.stats {
         bounces(report).iter().for_each(|line| args.output.say(line));
     }
-    if args.output.json { json_to_stdout(report) } else { Ok(()) }
+    match frames {
+        _ if !args.output.json => {}
+        None => json_to_stdout(report)?,
+        Some(all) => all.push(serde_json::to_value(report).map_err(|e| Error::io("stdout", e.into()))?),
+    }
+    Ok(())
 }
 
 /// One bounce of the paths; times are sums over threads.

@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::super::interrupt::stopped;
 use super::super::output::{json_to_stdout, to_stdout};
-use super::{Seconds, TraceArgs};
+use super::{Bytes, Mrays, Seconds, TraceArgs, mrays};
 use crate::error::{Error, Result};
 use crate::film::npy;
 use crate::lanes::{Real, compiled_isa};
+use crate::measure::answers::checksum;
 use crate::measure::raysets::split;
 use crate::measure::stats::summary;
 use crate::measure::timing::Workers;
@@ -33,12 +34,18 @@ struct Report<'a> {
     isa: &'static str,
     threads: usize,
     rays: u64,
+    /// Rays that have a stretch.
+    hits: u64,
     stretches: u64,
     /// Sum of all stretches' lengths in t, of those that end.
     inside: f64,
     repeat: u32,
     seconds: Seconds,
+    mrays_per_s: Mrays,
     build_seconds: f64,
+    bytes: Bytes,
+    /// Of the stretches, as a file of them has them.
+    checksum: String,
 }
 
 /// Traces, times and writes.
@@ -74,6 +81,7 @@ pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<
         npy::write_stretches(path, &found)?;
     }
     let seconds = summary(&seconds).ok_or_else(|| Error::Usage("--repeat 0: nothing to report".into()))?;
+    let (stats, count) = (world.stats(), rays.len() as u64);
     let report = Report {
         scene: &args.scene.scene,
         engine: if scalar { ONE_BY_ONE } else { PACKETS },
@@ -81,7 +89,9 @@ pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<
         precision: S::PRECISION,
         isa: compiled_isa(),
         threads: workers.threads(),
-        rays: rays.len() as u64,
+        rays: count,
+        // They are in order of rays.
+        hits: found.chunk_by(|a, b| a.ray == b.ray).count() as u64,
         stretches: found.len() as u64,
         // The sum of nothing is -0 to `sum`.
         inside: found
@@ -90,8 +100,11 @@ pub fn run<S: Engines>(args: &TraceArgs, description: &Description, rays: &Rays<
             .filter(|length| length.is_finite())
             .fold(0.0, |all, one| all + one),
         repeat: args.repeat,
-        build_seconds: world.stats().build_seconds,
+        mrays_per_s: Mrays { best: mrays(count, seconds.min), median: mrays(count, seconds.median) },
         seconds: Seconds { min: seconds.min, median: seconds.median, max: seconds.max },
+        build_seconds: stats.build_seconds,
+        bytes: Bytes::of(&stats),
+        checksum: format!("{:016x}", checksum(found.iter().flat_map(npy::stretch_record))),
     };
     if args.output.json { json_to_stdout(&report) } else { to_stdout(&text(&report)) }
 }
@@ -120,13 +133,13 @@ fn all<S: Engines>(world: &World<S>, batches: &[Rays<S>], scalar: bool) -> Vec<S
 }
 
 fn text(report: &Report<'_>) -> String {
-    let rate = report.rays as f64 / report.seconds.median.max(f64::MIN_POSITIVE) / 1e6;
     format!(
         "{} {} all {} ({}), {} threads\n\
          rays      {}\n\
-         stretches {}, length {:.6e}\n\
-         speed     {rate:.3} Mrays/s median of {}\n\
-         build     {:.3} s\n",
+         stretches {}, length {:.6e}, in {} rays\n\
+         speed     {:.3} Mrays/s median of {}\n\
+         build     {:.3} s\n\
+         checksum  {}\n",
         report.scene,
         report.engine,
         report.precision,
@@ -135,7 +148,10 @@ fn text(report: &Report<'_>) -> String {
         report.rays,
         report.stretches,
         report.inside,
+        report.hits,
+        report.mrays_per_s.median,
         report.repeat,
         report.build_seconds,
+        report.checksum,
     )
 }

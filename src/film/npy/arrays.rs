@@ -234,12 +234,15 @@ pub fn write_stretches(path: &Path, stretches: &[Stretch]) -> Result<u64> {
     let ids = ["ray", "inst", "prim_in", "prim_out"].map(|name| (name.to_owned(), "<u4".to_owned()));
     let descr = Descr::Record(numbers.into_iter().chain(ids).collect());
     write_array(path, &descr, &[], stretches.chunks(4096), |chunk: &&[Stretch], bytes| {
-        for s in *chunk {
-            bytes.extend([s.t_in, s.t_out].into_iter().flat_map(f64::to_le_bytes));
-            bytes.extend([s.ray, s.inst, s.prim_in, s.prim_out].into_iter().flat_map(u32::to_le_bytes));
-        }
+        chunk.iter().for_each(|s| bytes.extend(stretch_record(s)));
         chunk.len()
     })
+}
+
+/// The bytes of a stretch in such a file.
+pub fn stretch_record(s: &Stretch) -> impl Iterator<Item = u8> + use<> {
+    let (ends, ids) = ([s.t_in, s.t_out], [s.ray, s.inst, s.prim_in, s.prim_out]);
+    ends.into_iter().flat_map(f64::to_le_bytes).chain(ids.into_iter().flat_map(u32::to_le_bytes))
 }
 
 /// Writes flags of voxels as `|u1` of shape (nz, ny, nx): x runs fastest. `size` is nx, ny; `planes` have nx ny flags.

@@ -20,8 +20,8 @@ mod literal;
 mod planes;
 
 pub use arrays::{
-    parse_hits, parse_occlusion, parse_rays, read_hits, read_occlusion, read_rays, write_hits, write_occlusion,
-    write_rays, write_stretches, write_voxels,
+    parse_hits, parse_occlusion, parse_rays, read_hits, read_occlusion, read_rays, stretch_record, write_hits,
+    write_occlusion, write_rays, write_stretches, write_voxels,
 };
 pub use kind::{Kind, kind};
 pub use planes::{parse_film, parse_plane, read_film, read_plane, write_plane, write_stack};
