@@ -81,6 +81,7 @@ fn info() -> ImageInfo {
         engine: "packet16".to_owned(),
         isa: "x86-64-v4".to_owned(),
         lanes: 16,
+        batch: 256,
         spp: 4,
         seed: u64::MAX,
         render_seconds: 1.25,

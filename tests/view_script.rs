@@ -76,6 +76,12 @@ fn saved_pictures_know_how_they_were_made() {
         other => panic!("{name}: {other:?}"),
     };
     assert!(number("lanecast/rays") >= 3.0 * 65.0 * 40.0 && number("lanecast/renderSeconds") > 0.0);
+    // Lanes are those of a vector, however many vectors go together.
+    let ints = |of| ["lanecast/lanes", "lanecast/batch"].map(|name| told(of, name));
+    assert_eq!(
+        (ints(&seen), ints(&plain)),
+        (["I32(8)", "I32(8)"].map(String::from), ["I32(16)", "I32(1024)"].map(String::from))
+    );
     assert!(told(&seen, "lanecast/lanes").contains('8') && told(&turned, "lanecast/spp").contains('5'));
 }
 

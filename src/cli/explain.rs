@@ -167,7 +167,8 @@ fn write_exr(path: &Path, film: &Film, work: &Work) -> Result<()> {
         revision: REVISION.into(),
         engine: work.engine.into(),
         isa: compiled_isa().into(),
-        lanes: work.lanes as u32,
+        lanes: work.width as u32,
+        batch: work.lanes as u32,
         rays: work.rays,
         ..Default::default()
     };

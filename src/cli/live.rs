@@ -178,6 +178,7 @@ fn save(args: &ViewArgs, path: &Path, shot: &Shot, exposure: f32) -> Result<()> 
         engine: shot.engine.clone(),
         isa: compiled_isa().into(),
         lanes: shot.lanes,
+        batch: shot.batch,
         spp: shot.spp,
         seed: shot.look.options.seed,
         render_seconds: shot.seconds,

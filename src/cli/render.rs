@@ -340,7 +340,8 @@ fn picture<S: Shades>(
         scene_hash: description.hash.clone(),
         engine: engine.name().into(),
         isa: compiled_isa().into(),
-        lanes: engine.lanes() as u32,
+        lanes: engine.width() as u32,
+        batch: engine.lanes() as u32,
         // With a limit of noise or time the number asked for is only the most there may be.
         spp: if args.noise.is_none() && args.time_limit.is_none() && output.is_complete() {
             options.spp

@@ -75,6 +75,10 @@ pub trait Engine<S: Real>: Sync {
     fn name(&self) -> &'static str;
     /// Rays traced together.
     fn lanes(&self) -> usize;
+    /// Lanes of the vectors that rays are traced in; fewer than rays that are traced together where several vectors of them are.
+    fn width(&self) -> usize {
+        self.lanes()
+    }
     /// Whether the hits are those of the common formulas, bit for bit. Others are repeatable, whatever the threads and
     /// the order of batches, but a ray's answer may depend on its neighbours where rounding can tell.
     fn is_exact(&self) -> bool {

@@ -15,8 +15,10 @@ pub struct Shot {
     pub scene_hash: String,
     /// Engine that traced; whatever [`Look::options`] call it.
     pub engine: String,
-    /// Lanes of the engine; 0 if the scene has no such engine.
+    /// Lanes of the engine's vectors; 0 if the scene has no such engine.
     pub lanes: u32,
+    /// Rays that it traces together; likewise.
+    pub batch: u32,
     /// Samples per pixel; an average if it was stopped.
     pub spp: u32,
     /// Rays traced.
@@ -35,8 +37,18 @@ impl Shot {
         } else {
             (rays.primary as f64 / output.film.window.area().max(1) as f64).round().max(1.0) as u32
         };
-        let (engine, lanes) = stage.engine(&look.options.engine).unwrap_or_default();
+        let (engine, [lanes, batch]) = stage.engine(&look.options.engine).unwrap_or_default();
         let (engine, scene_hash) = (engine.into(), stage.description().hash.clone());
-        Self { film: output.film, look: look.clone(), scene_hash, engine, lanes, spp, rays: rays.total(), seconds }
+        Self {
+            film: output.film,
+            look: look.clone(),
+            scene_hash,
+            engine,
+            lanes,
+            batch,
+            spp,
+            rays: rays.total(),
+            seconds,
+        }
     }
 }

@@ -81,8 +81,9 @@ pub trait Stage: Send + Sync {
     fn bounds(&self) -> Option<(DVec3, DVec3)>;
     /// Engines that can trace it.
     fn engines(&self) -> Vec<&'static str>;
-    /// Name and lanes of the engine that is called `name`, which may stand for another one (`auto`); `None` if there is none.
-    fn engine(&self, name: &str) -> Option<(&'static str, u32)>;
+    /// The engine that is called `name`, which may stand for another one (`auto`): its name, the lanes of its vectors, and how many rays it
+    /// traces together; `None` if there is none.
+    fn engine(&self, name: &str) -> Option<(&'static str, [u32; 2])>;
     /// Seconds that building took.
     fn build_seconds(&self) -> f64;
     /// A picture on the current rayon pool; see [`Progressive`].
@@ -123,8 +124,8 @@ where
         S::engines().iter().map(|e| e.name()).collect()
     }
 
-    fn engine(&self, name: &str) -> Option<(&'static str, u32)> {
-        engine::<S>(name).ok().map(|engine| (engine.name(), engine.lanes() as u32))
+    fn engine(&self, name: &str) -> Option<(&'static str, [u32; 2])> {
+        engine::<S>(name).ok().map(|engine| (engine.name(), [engine.width(), engine.lanes()].map(|n| n as u32)))
     }
 
     fn build_seconds(&self) -> f64 {

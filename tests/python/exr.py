@@ -31,6 +31,7 @@ def check_header(header):
         "lanecast/engine": "packet16",
         "lanecast/isa": "x86-64-v4",
         "lanecast/lanes": 16,
+        "lanecast/batch": 256,
         "lanecast/spp": 4,
         "lanecast/seed": "18446744073709551615",
         "lanecast/renderSeconds": 1.25,

@@ -27,8 +27,10 @@ pub struct ImageInfo {
     pub engine: String,
     /// Instruction set the engine ran on; `lanecast/isa`.
     pub isa: String,
-    /// Lane width; `lanecast/lanes`, an int.
+    /// Lanes of the vectors that rays were traced in; `lanecast/lanes`, an int.
     pub lanes: u32,
+    /// Rays that were traced together; `lanecast/batch`, an int.
+    pub batch: u32,
     /// Samples per pixel, on average where pixels have different numbers of them; `lanecast/spp`, an int.
     pub spp: u32,
     /// Seed of the sampler; `lanecast/seed`, a string of decimal digits because EXR has no 64-bit integer.

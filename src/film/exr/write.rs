@@ -120,6 +120,7 @@ fn layer_attributes(film: &Film, info: &ImageInfo) -> LayerAttributes {
         ("engine", words(&info.engine), !info.engine.is_empty()),
         ("isa", words(&info.isa), !info.isa.is_empty()),
         ("lanes", int(info.lanes), info.lanes > 0),
+        ("batch", int(info.batch), info.batch > 0),
         ("spp", int(info.spp), is_sampled),
         ("seed", words(&info.seed.to_string()), is_sampled),
         ("renderSeconds", AttributeValue::F64(info.render_seconds), is_traced),

@@ -39,6 +39,8 @@ pub struct Work {
     pub engine: &'static str,
     /// Rays traced together.
     pub lanes: usize,
+    /// Lanes of the vectors that they are traced in.
+    pub width: usize,
     /// Packets with a live ray.
     pub packets: u64,
     /// Live rays.
@@ -147,6 +149,7 @@ pub fn work<S: Engines>(
     Ok(Work {
         engine: engine.name(),
         lanes,
+        width: engine.width(),
         packets: all.len() as u64,
         rays: total.rays,
         per_packet: PerPacket {

@@ -344,6 +344,10 @@ where
         RAYS
     }
 
+    fn width(&self) -> usize {
+        V::N
+    }
+
     fn intersect(
         &self,
         world: &World<V::Scalar>,

@@ -18,6 +18,10 @@ impl<const EXACT: bool> Engine<f32> for Tile<EXACT> {
         self.most * f32x16::N
     }
 
+    fn width(&self) -> usize {
+        f32x16::N
+    }
+
     fn is_exact(&self) -> bool {
         EXACT
     }
