@@ -215,12 +215,12 @@ fn scaling_has_rows_of_each_number_of_threads() {
 fn peers_are_rows_and_a_missing_one_says_so() {
     let dir = square();
     let line = "bench square.ply --size 64x32 --rays primary,ao --engines scalar,packet8 --repeat 3 \
-                --peers obvhs,embree,obvhs --embree nowhere.so --json";
+                --peers obvhs,embree,obvhs,tinybvh --embree nowhere.so --json";
     let report = run(&dir, line).json();
     let rows = report["rows"].as_array().expect("rows");
     assert!(report["run"]["rustc"].as_str().is_some_and(|name| name.starts_with("rustc ")), "{}", report["run"]);
     assert!(report["run"]["flags"].is_string(), "{}", report["run"]);
-    assert_eq!(rows.len(), 10, "2 classes x (2 engines, 2 trees of obvhs, no Embree): {report}");
+    assert_eq!(rows.len(), 12, "2 classes x (2 engines, 2 trees of obvhs, no Embree, no tinybvh): {report}");
     let rate = report["ports"]["multiply_add"]["per_cycle"].as_f64();
     assert!(rate.is_some_and(|rate| (0.2..8.0).contains(&rate)), "{}", report["ports"]);
     let hits = |engine: &str, class: &str| {
@@ -236,6 +236,7 @@ fn peers_are_rows_and_a_missing_one_says_so() {
         let (peer, outcome) = (&row["peer"], &row["outcome"]);
         match row["engine"].as_str() {
             Some("embree") => assert!(outcome["skipped"].as_str().is_some_and(|why| why.contains("nowhere.so"))),
+            Some("tinybvh") => assert!(outcome["skipped"].as_str().is_some_and(|why| why.contains("C++ header"))),
             Some("scalar" | "packet8") => assert!(peer.is_null()),
             _ => assert!(peer["lead"].as_f64() > Some(0.0) && peer["quoted"] == true, "{row}"),
         }

@@ -68,7 +68,7 @@ pub struct BenchArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     engines: Vec<String>,
     /// Other tracers to run beside them, on the same rays and threads: obvhs, embree, embree-robust, and with the cargo
-    /// feature `peers` bvh, parry
+    /// feature `peers` bvh, parry; tinybvh is in no build, and its rows say so
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Peers")]
     peers: Vec<String>,
     /// Embree 4's shared library [default: $LANECAST_EMBREE, else the usual names on the library path]

@@ -28,7 +28,14 @@ use crate::scene::world::World;
 use triangles::{PlacedTriangles, Triangles};
 
 /// What `--peers` takes.
-pub const NAMES: [&str; 5] = ["obvhs", "embree", "embree-robust", "bvh", "parry"];
+pub const NAMES: [&str; 6] = ["obvhs", "embree", "embree-robust", "bvh", "parry", TINYBVH];
+
+/// A peer that no build has: its rows say so.
+pub const TINYBVH: &str = "tinybvh";
+
+/// Why there is none of it.
+const NO_TINYBVH: &str =
+    "not in any build: a C++ header, of which there is neither a packaged library to load nor a crate to build in";
 
 /// What a row says about a peer.
 #[derive(Clone, Debug, Default)]
@@ -112,7 +119,8 @@ impl Invitation {
         if self.names.is_empty() {
             return Ok(Vec::new());
         }
-        let wanted = |embree: bool| self.names.iter().any(|name| name.starts_with("embree") == embree);
+        let wanted =
+            |embree: bool| self.names.iter().any(|name| name != TINYBVH && name.starts_with("embree") == embree);
         let flat = if wanted(false) { Triangles::flatten(&world.assembly) } else { Ok(Triangles::default()) };
         let of_world = || PlacedTriangles::of(&world.traced, world.names.as_ref());
         let placed = if wanted(true) { of_world() } else { Ok(PlacedTriangles::default()) };
@@ -135,6 +143,7 @@ impl Invitation {
                     let open = |triangles| embree::open(library, triangles, workers.threads(), robust);
                     add(name, placed.clone().and_then(open));
                 }
+                TINYBVH => add(name, Err(NO_TINYBVH.into())),
                 _ => add(name, with(&|triangles| of_feature(name, triangles))),
             }
         }

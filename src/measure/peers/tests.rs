@@ -138,6 +138,13 @@ fn peers_of_the_feature_are_not_in_this_build() {
     }
 }
 
+/// The name is known, the row says why there is nothing.
+#[test]
+fn a_peer_that_no_build_has_says_so() {
+    let why = refusal::<f32>(&soup(), &["tinybvh"], "");
+    assert!(why.starts_with("not in any build: a C++ header"), "{why}");
+}
+
 #[test]
 fn every_mode_of_embree_finds_what_scalar_finds() {
     let invitation = Invitation { names: vec!["embree".into(), "embree-robust".into()], embree: None };
