@@ -134,6 +134,24 @@ fn script_corpus() {
 }
 
 #[test]
+fn view_corpus() {
+    const REFUSED: [&str; 5] = ["mirrored.rt", "no_size.rt", "open.rt", "misspelt.rt", "infinite.rt"];
+    let parse = |file: &Path, bytes: &[u8]| lanecast::scene::brlcad::view::parse(file, bytes).is_ok();
+    for (name, accepted) in verdicts("view", parse).into_iter().filter(|(name, _)| name.contains('.')) {
+        assert_eq!(accepted, !REFUSED.contains(&name.as_str()), "{name}");
+    }
+}
+
+#[test]
+fn bench_corpus() {
+    const REFUSED: [&str; 4] = ["columns.csv", "twice.csv", "negative.csv", "short.csv"];
+    let parse = |file: &Path, bytes: &[u8]| lanecast::measure::compare::parse(file, bytes).is_ok();
+    for (name, accepted) in verdicts("bench", parse).into_iter().filter(|(name, _)| name.contains('.')) {
+        assert_eq!(accepted, !REFUSED.contains(&name.as_str()), "{name}");
+    }
+}
+
+#[test]
 fn mtl_corpus() {
     let parse = |file: &Path, bytes: &[u8]| lanecast::scene::mtl::parse(file, bytes).is_ok();
     for (name, accepted) in verdicts("mtl", parse).into_iter().filter(|(name, _)| name.contains('.')) {

@@ -16,7 +16,7 @@ use std::fmt::Write as _;
 
 use crate::error::{Error, Result};
 use crate::measure::intervals::{Estimate, Interval, ratio_of_medians, ratio_over_turns};
-pub use read::{Figure, Key, Turn, read};
+pub use read::{Figure, Key, Turn, parse, read};
 
 /// Standard errors that bound the interval of a file without single passes.
 const SIGMAS: f64 = 3.0;

@@ -121,7 +121,10 @@ impl Scenes {
 }
 
 /// [`read`] of one file in memory; `path` is only for messages.
-pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Turn> {
+///
+/// # Errors
+/// With line and column, as [`read`].
+pub fn parse(path: &Path, text: &[u8]) -> Result<Turn> {
     let mut reader = csv::Reader::from_reader(text);
     let wrong = |e: csv::Error| {
         let line = e.position().map_or(1, csv::Position::line);
