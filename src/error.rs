@@ -154,7 +154,9 @@ impl Error {
 
 /// The candidate nearest to `word` by edit distance, if it is near enough to be a misspelling.
 ///
-/// Distance is Levenshtein's; a candidate counts when it needs at most a third of the word's letters changed.
+/// Distance is Levenshtein's, where two neighbours that are swapped are one change, as in R. Lowrance, R. A. Wagner, "An Extension of the
+/// String-to-String Correction Problem", 1975 (no letter is changed twice); a candidate counts when it needs at most a third of the
+/// word's letters changed, or one change.
 pub fn nearest_name<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let limit = (word.chars().count() / 3).max(1);
     candidates
@@ -185,15 +187,19 @@ pub fn by_name<T: Copy>(what: &str, all: &[T], name_of: impl Fn(T) -> &'static s
 }
 
 fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
+    let [a, b] = [a, b].map(|word| word.chars().collect::<Vec<char>>());
     let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
+    // The row before the last one: swapped letters reach back two.
+    let (mut last, mut before) = (row.clone(), row.clone());
+    for i in 0..a.len() {
+        (before, last, row) = (last, row, before);
         row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let substitute = diagonal + usize::from(ca != *cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substitute.min(row[j] + 1).min(row[j + 1] + 1);
+        for j in 0..b.len() {
+            let substitute = last[j] + usize::from(a[i] != b[j]);
+            row[j + 1] = substitute.min(row[j] + 1).min(last[j + 1] + 1);
+            if i > 0 && j > 0 && (a[i], a[i - 1]) == (b[j - 1], b[j]) {
+                row[j + 1] = row[j + 1].min(before[j - 1] + 1);
+            }
         }
     }
     row[b.len()]
@@ -215,5 +221,19 @@ mod tests {
     fn nearest_name_finds_misspellings_only() {
         assert_eq!(nearest_name("spere", ["sphere", "box"]), Some("sphere"));
         assert_eq!(nearest_name("torus", ["sphere", "box"]), None);
+        // Swapped letters are one slip.
+        assert_eq!(nearest_name("bxo", ["sphere", "box"]), Some("box"));
+        assert_eq!(nearest_name("mian", ["low", "main"]), Some("main"));
+        for (a, b, distance) in [
+            ("", "", 0),
+            ("", "abc", 3),
+            ("abc", "", 3),
+            ("ab", "ba", 1),
+            ("abcd", "badc", 2),
+            ("ca", "abc", 3),
+            ("kitten", "sitting", 3),
+        ] {
+            assert_eq!((edit_distance(a, b), edit_distance(b, a)), (distance, distance), "{a} {b}");
+        }
     }
 }

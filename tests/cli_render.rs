@@ -100,6 +100,7 @@ fn refusals_say_what_is_expected() {
         ("render square.ply -o a.exr --spp 0", "samples per pixel"),
         ("render square.ply -o a.exr --crop 0,0,9999,5", "leaves the picture"),
         ("render square.ply -o a.exr --camera front", "no camera `front`"),
+        ("render builtin:terrain -o a.exr --camera mian", "(did you mean `main`?)"),
         ("render square.ply -o a.exr --eye 1,1,1 --look-at 1,1,1", "same point"),
         ("render square.ply -o a.exr --eye 0,5,0 --look-at 0,0,0 --up 0,1,0", "--up must not point along the view"),
         ("view square.ply --eye 0,5,0 --look-at 0,0,0 --up 0,-2,0", "--up must not point along the view"),

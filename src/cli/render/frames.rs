@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::{RenderArgs, check_rt, options, picture, report};
 use crate::cli::common::{SceneArgs, with_pool};
 use crate::cli::output::json_to_stdout;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, locked};
 use crate::scene::description::{Description, Precision};
 use crate::scene::kdl::FRAME;
 use crate::scene::load::has_parameters;
@@ -95,7 +95,7 @@ fn each(args: &RenderArgs, frames: Frames, told: &mut Vec<Value>, kept: &Mutex<V
         let is_there = args.resume && of_frame.all_files(&options).iter().all(|file| file.exists());
         if is_there {
             args.output.say(&format!("{}: there already", of_frame.file()));
-            kept.lock().into_iter().for_each(|mut kept| kept.push(of_frame.file()));
+            locked(kept).push(of_frame.file());
         }
         !is_there
     };

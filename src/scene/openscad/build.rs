@@ -13,7 +13,7 @@ use super::minkowski;
 use super::solids::{Solids, Trouble};
 use super::syntax::{Node, Source};
 use super::work::Work;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, nearest_name};
 use crate::scene::description::MaterialId;
 use crate::scene::mesh::Mesh;
 use crate::scene::solids::{NodeId, NodeKind, SolidTree};
@@ -99,7 +99,8 @@ impl<'s, 'a, 'r> Builder<'s, 'a, 'r> {
     pub fn warn(&mut self, i: usize, what: &str) {
         if self.warnings.len() < MAX_WARNINGS {
             let node = &self.nodes[i];
-            self.warnings.push(format!("line {}: `{}`: {what}", self.source.line(node.at), node.name));
+            let (file, line) = (self.source.file.display(), self.source.line(node.at));
+            self.warnings.push(format!("{file}:{line}: `{}`: {what}", node.name));
         }
     }
 
@@ -112,8 +113,10 @@ impl<'s, 'a, 'r> Builder<'s, 'a, 'r> {
     pub fn fields(&mut self, i: usize, known: &'static [&'static str]) -> Fields<'s, 'a> {
         let fields = Fields::new(self.source, &self.nodes[i], known);
         if let Some(name) = fields.unknown() {
+            let near = nearest_name(name, fields.known.iter().copied());
+            let near = near.map_or(String::new(), |near| format!(" (did you mean `{near}`?)"));
             let name = crate::scene::text::shown(name.as_bytes());
-            self.warn(i, &format!("the argument {name} is not known and means nothing"));
+            self.warn(i, &format!("the argument {name} is not known and means nothing{near}"));
         }
         fields
     }

@@ -16,7 +16,7 @@ pub(super) struct Fields<'s, 'a> {
     /// The call.
     pub node: &'s Node<'a>,
     /// Names of arguments, those without a name in this order.
-    known: &'static [&'static str],
+    pub known: &'static [&'static str],
 }
 
 impl<'s, 'a> Fields<'s, 'a> {

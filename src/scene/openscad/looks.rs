@@ -119,7 +119,8 @@ fn root(source: &Source<'_>, nodes: &[Node<'_>], description: &mut Description) 
             node.children.iter().for_each(|&child| is_disabled[child as usize] = true);
         } else if node.marks.root {
             let line = source.line(node.at);
-            description.warnings.push(format!("nothing is shown but what is marked with `!` in line {line}"));
+            let file = source.file.display();
+            description.warnings.push(format!("{file}:{line}: nothing is shown but what is marked with `!`"));
             return i as u32;
         }
     }

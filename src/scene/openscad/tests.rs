@@ -277,8 +277,10 @@ fn empty_operands_are_openscads() {
     near(volume("difference() { %sphere(); cube(); *cube(size = 9); }"), 1.0);
     near(volume("difference() { cube(); square(size = 9); }"), 1.0);
     assert!(is_empty("intersection() { cube(); square(); }"));
-    assert_eq!(warnings("cube(); square();"), ["line 1: `square`: a plane figure among solids is left out"]);
+    assert_eq!(warnings("cube(); square();"), ["m.csg:1: `square`: a plane figure among solids is left out"]);
     assert_eq!(warnings("%cube(); cube();"), ["objects in the background (`%`) are left out: 1"]);
+    let unknown = "m.csg:2: `cube`: the argument `sizes` is not known and means nothing (did you mean `size`?)";
+    assert_eq!(warnings("cube();\ncube(sizes = 2);"), [unknown]);
     near(volume("square(size = 3);"), 9.0);
     assert!(warnings("square();")[0].contains("plate of height 1"));
 }
@@ -287,7 +289,7 @@ fn empty_operands_are_openscads() {
 fn only_what_is_marked_is_shown() {
     let text = "multmatrix([[2,0,0,0],[0,2,0,0],[0,0,2,0]]) { color([1,0,0]) { !cube(size = 3); } sphere(); }";
     near(volume(text), 27.0);
-    assert_eq!(warnings(text), ["nothing is shown but what is marked with `!` in line 1"]);
+    assert_eq!(warnings(text), ["m.csg:1: nothing is shown but what is marked with `!`"]);
     near(volume("*group() { !cube(); } cube(size = 2);"), 8.0);
 }
 
