@@ -37,7 +37,8 @@ and v (f4), on triangles the weights of the second and the third corner, on shap
 and 1 where a solid was subtracted, else 0; prim (u4), the number of the primitive in its object, and inst (u4), that \
 of the instance, both in the order of the scene, 4294967295 where nothing is hit.
 The hits are compared with the scalar engine's before the clock starts: bit for bit, or, for the engine tile, up to \
-what the f64 oracle explains by rounding.";
+what the f64 oracle explains by rounding. That engine (and auto, where it is tile) may answer closest and any \
+differently for rays that begin or end on a surface, within the rounding of t at t_min and t_max; --exact does not.";
 
 /// Arguments of `lanecast trace`.
 #[derive(Debug, clap::Args)]

@@ -107,7 +107,11 @@ pub trait Engine<S: Real>: Sync {
     ) -> bool {
         false
     }
-    /// Whether anything lies in each ray's segment: `out` is resized to the batch's length, 1 is occluded. On the calling thread, too.
+    /// Whether anything lies in each ray's segment: `out` is resized to the batch's length, 1 is occluded. The answer is whether
+    /// [`Self::intersect`] finds something there, but for engines that are not [exact](Self::is_exact): rays with a common end are traced
+    /// from there, and may differ within rounding of an edge or of an end of the segment; of rays without a common point closest-hit has a `t`
+    /// of the engine's own, so the two may differ where that is within its bound of `t_min` or `t_max`, as of rays that begin or end on
+    /// a surface. On the calling thread, too.
     fn occluded(
         &self,
         world: &World<S>,
