@@ -55,7 +55,7 @@ pub struct Chunk<S> {
     pub dominant: [Set; 3],
     /// Whether some ray may be [`Triangle::along_a_face`].
     pub flat: bool,
-    /// Rays of which the sieve is sure of nothing: those with an infinite [`Line::gauge`].
+    /// Rays of which the sieve is sure of nothing: see [`Chunk::find_common`].
     pub common: Set,
     /// Whether some `shift` is too large to compute with.
     pub steep: bool,
@@ -155,6 +155,7 @@ impl<S: Real> Chunk<S> {
         if !ANY && self.len >= DENSE as usize {
             self.mean = self.sum_of_directions::<V>();
         }
+        self.find_common::<V>(Set::MAX);
     }
 
     /// Starts anew, with `len` rays to come, with or without what the common formula needs of them beside.
@@ -172,6 +173,33 @@ impl<S: Real> Chunk<S> {
         store3(packet.dir, &mut self.dir, at);
         packet.t_min.store(&mut self.t_min[at..]);
         self.put(at, packet, live);
+    }
+
+    /// Finds out, once all rays are there, which of `rays` have an infinite [`Line::gauge`], and prepares them for the common formula. Not
+    /// vector by vector as they come: what is rarely needed of a vector would keep all of it from staying in registers.
+    #[inline(always)]
+    pub fn find_common<V: Lanes<Scalar = S>>(&mut self, rays: Set) {
+        let mut common = 0;
+        for at in (0..self.len).step_by(V::N) {
+            let infinite = V::splat(V::Scalar::MAX).cmp_lt(V::load(&self.gauge[at..])).bits();
+            common |= Set::from(infinite) << at;
+        }
+        self.common = common & rays & Set::MAX.unbounded_shr((RAYS - self.len) as u32);
+        if self.common != 0 && !self.sheared {
+            self.shear_common::<V>();
+        }
+    }
+
+    /// Works out what the common formula needs of `common` rays, and of those in vectors with them.
+    #[cold]
+    #[inline(never)]
+    fn shear_common<V: Lanes<Scalar = S>>(&mut self) {
+        for at in (0..self.len).step_by(V::N) {
+            if (self.common >> at) as u32 & V::ALL != 0 {
+                let (org, dir) = (load3::<V>(&self.org, at), load3(&self.dir, at));
+                self.put_shear(at, &Packet::new(org, dir, V::load(&self.t_min[at..])));
+            }
+        }
     }
 
     /// Notes the octants of a vector of rays.
@@ -203,25 +231,13 @@ impl<S: Real> Chunk<S> {
         let [x, y, z] = map3(product, |x| x.abs().cmp_le(most));
         self.steep |= !(x & y & z).bits() & live != 0;
         self.flat |= Triangle::along_a_face(packet.dir).bits() & live != 0;
-        let gauge = gauge(packet.org, packet.dir);
-        gauge.store(&mut self.gauge[at..]);
-        let common = V::splat(V::Scalar::MAX).cmp_lt(gauge).bits() & live;
-        self.common |= Set::from(common) << at;
+        gauge(packet.org, packet.dir).store(&mut self.gauge[at..]);
         let from_start = packet.t_floor.cmp_lt(packet.t_min);
         V::select(from_start, packet.t_min, V::splat(V::Scalar::LOWEST)).store(&mut self.t_low[at..]);
         packet.t_floor.store(&mut self.t_floor[at..]);
         if self.sheared {
             self.put_shear(at, packet);
-        } else if common != 0 {
-            self.make_shear(at, packet);
         }
-    }
-
-    /// Works out what the common formula needs of a vector of rays that come without it.
-    #[cold]
-    #[inline(never)]
-    fn make_shear<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>) {
-        self.put_shear(at, &Packet::new(packet.org, packet.dir, packet.t_min));
     }
 
     /// Puts in what the common formula needs beside.

@@ -92,6 +92,7 @@ impl<S: Real> Inside<S> {
             }
             inside |= Set::from(meets) << at;
         }
+        self.chunk.find_common::<V>(inside);
         self.chunk.region = from.region.is_some().then(|| extent.region());
         inside
     }

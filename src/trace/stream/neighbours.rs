@@ -80,6 +80,7 @@ impl<S: Real> Job<'_, S> {
         }
         (chunk.mixed, chunk.region) = (true, Some(region));
         best.done = dead;
+        chunk.find_common::<V>(!dead);
         let rays = chunk.len as u32 - dead.count_ones();
         if COUNT {
             self.counters.rays += u64::from(rays);

@@ -61,6 +61,7 @@ impl<S: Real> Visitors<S> {
     ) {
         let Self { chunk, best, waiting, closer, sifted, rays } = self;
         chunk.len = vectors * V::N;
+        chunk.find_common::<V>(*rays);
         let object = &world.objects[world.instances[inst as usize].object as usize];
         let room = Room { waiting, closer, sifted };
         let mut walk = Walk::new(best, room, stack, counters, !world.kinds.large);
