@@ -6,6 +6,7 @@ mod common;
 mod tile_support;
 
 mod engine;
+mod gaps;
 mod instances;
 mod joined;
 mod order;
