@@ -300,7 +300,8 @@ mod tests {
         let number = |i: usize| V::Scalar::from_f64(i as f64);
         let mut all = Rays::<V::Scalar>::new(RAYS);
         for i in 0..RAYS {
-            let dir = [number(1), number(2 + i % 2), number(i)];
+            // Along no face: of those all is prepared.
+            let dir = [number(1), number(2 + i % 2), number(1 + i)];
             all.set(i, [number(i), number(0), number(0)], dir, number(i), number(1000));
         }
         let (mut rows, places) = (vec![Row::ZERO; RAYS], (0..RAYS as u32).collect::<Vec<_>>());
