@@ -55,7 +55,7 @@ pub struct Chunk<S> {
     pub dominant: [Set; 3],
     /// Whether some ray may be [`Triangle::along_a_face`].
     pub flat: bool,
-    /// Rays of which the sieve is sure of nothing: see [`Chunk::find_common`].
+    /// Rays along faces, of which the sieve is sure of nothing: see [`Chunk::find_common`].
     pub common: Set,
     /// Whether some `shift` is too large to compute with.
     pub steep: bool,
@@ -179,6 +179,11 @@ impl<S: Real> Chunk<S> {
     /// vector by vector as they come: what is rarely needed of a vector would keep all of it from staying in registers.
     #[inline(always)]
     pub fn find_common<V: Lanes<Scalar = S>>(&mut self, rays: Set) {
+        self.common = 0;
+        // What is too large for bounds is rarer still, and may be decided triangle by triangle.
+        if !self.flat {
+            return;
+        }
         let mut common = 0;
         for at in (0..self.len).step_by(V::N) {
             let infinite = V::splat(V::Scalar::MAX).cmp_lt(V::load(&self.gauge[at..])).bits();
