@@ -53,10 +53,10 @@ pub struct Chunk<S> {
     pub axis: [u8; RAYS],
     /// Rays with each dominant axis.
     pub dominant: [Set; 3],
-    /// Whether some ray may be [`Triangle::along_a_face`].
-    pub flat: bool,
     /// Rays along faces, of which the sieve is sure of nothing: see [`Chunk::find_common`].
     pub common: Set,
+    /// Whether some ray may be [`Triangle::along_a_face`].
+    pub flat: bool,
     /// Whether some `shift` is too large to compute with.
     pub steep: bool,
     /// Sum of the directions (closest-hit, of at least [`DENSE`] rays with `bounds`).
