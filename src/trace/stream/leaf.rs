@@ -36,16 +36,6 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
         return;
     }
     if walk.sieve {
-        let rays = match rays & chunk.common {
-            0 => rays,
-            some => {
-                common::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk, child, some);
-                rays & !some
-            }
-        };
-        if rays == 0 {
-            return;
-        }
         if ANY && rays.count_ones() < due::FEW {
             if walk.due.add(child, rays) {
                 due::test::<V::Scalar, COUNT>(object, inst, chunk, walk);
@@ -223,21 +213,6 @@ impl<S: Real> Closer<S> {
             best.take(ray, wanted, &found, &block.prim, inst);
         }
     }
-}
-
-/// Rays of which the sieve is sure of nothing, among others: it would leave every triangle of the block to the common formula, one by
-/// one.
-#[cold]
-#[inline(never)]
-fn common<S: Real, const ANY: bool, const COUNT: bool>(
-    object: &Object<S>,
-    inst: u32,
-    chunk: &Chunk<S>,
-    walk: &mut Walk<S>,
-    child: Child,
-    rays: Set,
-) {
-    sparse::<S, ANY, COUNT>(object, inst, chunk, walk, child, rays);
 }
 
 /// One ray after the other against all triangles of the block; then a closer look by those that may hit some, with what

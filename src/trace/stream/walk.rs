@@ -199,9 +199,21 @@ impl<'a, S: Real> Walk<'a, S> {
         rays: Set,
         octant: usize,
     ) {
-        match chunk.mixed {
-            true => self.within::<V, ANY, COUNT, true>(object, inst, chunk, rays, octant),
-            false => self.within::<V, ANY, COUNT, false>(object, inst, chunk, rays, octant),
+        let through = |walk: &mut Self, rays: Set| match chunk.mixed {
+            true => walk.within::<V, ANY, COUNT, true>(object, inst, chunk, rays, octant),
+            false => walk.within::<V, ANY, COUNT, false>(object, inst, chunk, rays, octant),
+        };
+        let common = rays & chunk.common;
+        if common == 0 || !self.sieve {
+            return through(self, rays);
+        }
+        // By themselves, so that no leaf of other rays has to ask for them.
+        self.sieve = false;
+        through(self, common);
+        self.sieve = true;
+        let rest = rays & !common & if ANY { !self.best.done } else { Set::MAX };
+        if rest != 0 {
+            through(self, rest);
         }
     }
 

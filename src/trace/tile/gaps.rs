@@ -85,9 +85,6 @@ impl Trial {
     /// Of some triangles `left` were left.
     #[inline(always)]
     pub fn thinned(&mut self, triangles: usize, left: usize) {
-        if self.gaps.is_none() {
-            return;
-        }
         self.seen = [self.seen[0] + triangles, self.seen[1] + triangles - left];
         if self.seen[0] >= PROOF {
             let [triangles, out] = self.seen.map(|count| count as f32);
@@ -178,9 +175,9 @@ impl Memory {
     #[inline(never)]
     pub fn thin(&mut self, last: bool) -> bool {
         let Self { groups, batch, kept, trial, .. } = self;
-        if !last {
+        if let (false, Some(gaps)) = (last, &trial.gaps) {
             let (waiting, before) = (batch.len(), kept.len());
-            batch.thin(trial.gaps.as_ref(), groups, kept);
+            batch.thin(gaps, groups, kept);
             trial.thinned(waiting, kept.len() - before);
         }
         let enough = last || kept.len() >= BATCH;
@@ -192,15 +189,15 @@ impl Memory {
 }
 
 impl Batch {
-    /// Moves those of the waiting triangles that a ray may meet to `to`, which has room for sixteen; all of them, if nothing tells.
+    /// Moves those of the waiting triangles that a ray may meet to `to`, which has room for sixteen.
     #[inline(always)]
-    pub fn thin(&mut self, gaps: Option<&Gaps>, groups: &Groups, to: &mut Self) {
+    pub fn thin(&mut self, gaps: &Gaps, groups: &Groups, to: &mut Self) {
         let apex = map3(groups.frame.apex, V::splat);
         let p: [Lanes3<V>; 3] = each(|i| {
             let corner = each(|a| V::load(&self.corners[3 * i + a]));
             if groups.many { corner } else { each(|a| corner[a] - apex[a]) }
         });
-        let kept = gaps.map_or(u32::MAX, |gaps| gaps.kept(&p)) & self.lanes();
+        let kept = gaps.kept(&p) & self.lanes();
         self.move_to(to, kept, groups.many);
     }
 
