@@ -2,6 +2,7 @@
 
 use crate::lanes::{Real, each};
 use crate::math::Aabb;
+use wide::u8x16;
 
 /// Children per node.
 pub const WIDTH: usize = 8;
@@ -82,6 +83,14 @@ impl<S: Real, const W: usize> Node<S, W> {
     #[inline(always)]
     pub fn child_bounds(&self, slot: usize) -> Aabb<S> {
         Aabb { lo: each(|a| self.bounds[a][0][slot]), hi: each(|a| self.bounds[a][1][slot]) }
+    }
+
+    /// Children that are inner nodes, as bits; slots that are not in use look like such.
+    #[inline(always)]
+    pub fn inner(&self) -> u32 {
+        let mut counts = [u8::MAX; WIDE];
+        counts[..W].copy_from_slice(&self.count);
+        u8x16::new(counts).simd_eq(u8x16::ZERO).to_bitmask()
     }
 
     /// Reference to a child.

@@ -21,6 +21,7 @@ mod bundle;
 mod columns;
 mod dead;
 mod density;
+mod due;
 mod edges;
 mod engine;
 mod even;
@@ -100,6 +101,8 @@ pub struct Memory {
     /// Those of them that are left where some are left out ([`gaps`]).
     kept: batch::Batch,
     trial: gaps::Trial,
+    /// Leaves that are about to be read.
+    due: due::Due,
     planes: batch::Planes,
     listing: listing::Listing,
     again: pairs::Again,

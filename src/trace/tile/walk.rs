@@ -14,7 +14,7 @@ use super::slab::Space;
 use super::{GROUPS, HALF_ULP, Memory, SET, V};
 use crate::bvh::{Child, Node, Nodes, Tree, WIDE};
 use crate::lanes::Lanes;
-use crate::lanes::words::{least_key, prefetch, prefetch_either};
+use crate::lanes::words::{least_key, prefetch, prefetch_for_later};
 use crate::ray::Counters;
 use crate::scene::world::{Class, Instance, Object, World};
 use crate::shape::BLOCK;
@@ -30,13 +30,15 @@ struct View<'a> {
 
 /// What the leaves of a tree hold.
 trait Leaves<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> {
-    /// Asks the memory for what a child refers to: a node of `nodes`, or a leaf.
-    fn fetch(&self, nodes: &[Node<f32, WIDTH>], child: Child);
+    /// Asks the memory for some leaves of a node, as bits, that will be visited before long, unless [`Leaves::visit`] does.
+    fn fetch(&self, node: &Node<f32, WIDTH>, leaves: u32);
     /// Whether a leaf that `groups` met is dear enough for a test of its box against single rays; `pays`: such tests have paid
     /// lately.
     fn is_dear(&self, leaf: Child, groups: u64, pays: bool) -> bool;
     /// Visits a leaf with some groups.
     fn visit(&self, memory: &mut Memory, exact: &Exact, leaf: Child, groups: u64, counters: &mut Counters);
+    /// No more leaves will come.
+    fn finish(&self, memory: &mut Memory, exact: &Exact, counters: &mut Counters);
 }
 
 /// Blocks of triangles, of an instance or in the world.
@@ -122,7 +124,7 @@ fn descend<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool
         let (nearest, slot) = least_key(&level.keys);
         if u32::from(nearest) >= limit {
             if depth == view.first {
-                break;
+                return leaves.finish(memory, exact, counters);
             }
             depth -= 1;
             continue;
@@ -183,17 +185,19 @@ fn open<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
         counters.node_lanes_active += u64::from(groups.count_ones()) * V::N as u64;
         counters.node_lanes_total += (N * SET * V::N) as u64;
     }
-    let mut met = view.planes.open::<N>(node, (tile, groups), level);
+    let met = view.planes.open::<N>(node, (tile, groups), level);
     if met == 0 {
         return false;
     }
     level.node = index;
-    // Most of them are visited, one after the other: their way from memory starts now.
+    // Most of them are visited, one after the other: their way from memory starts now. As far as the second cache, as there may be more
+    // lines than can be under way at once.
     let nodes = Nodes::<f32, WIDTH>::of_width(view.tree);
-    while met != 0 {
-        let child = node.child(slot(met.trailing_zeros()));
-        met &= met - 1;
-        leaves.fetch(nodes, child);
+    let mut inner = met & node.inner();
+    leaves.fetch(node, met & !inner);
+    while inner != 0 {
+        prefetch_for_later(nodes, node.child(slot(inner.trailing_zeros())).index as usize);
+        inner &= inner - 1;
     }
     true
 }
@@ -202,9 +206,7 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
     for Blocks<'_>
 {
     #[inline(always)]
-    fn fetch(&self, nodes: &[Node<f32, WIDTH>], child: Child) {
-        prefetch_either(nodes, &self.object.triangles, child.is_leaf(), child.index as usize);
-    }
+    fn fetch(&self, _node: &Node<f32, WIDTH>, _leaves: u32) {}
 
     #[inline(always)]
     fn is_dear(&self, leaf: Child, _groups: u64, _pays: bool) -> bool {
@@ -222,6 +224,31 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
             shapes::visit::<N, ANY, COUNT>(state, exact, shapes, leaf, groups, stack, counters);
             return;
         }
+        prefetch(&self.object.triangles, leaf.index as usize);
+        if let Some((leaf, groups)) = memory.due.put(leaf, groups, memory.trial.gaps.is_some()) {
+            self.read::<N, ANY, EXACT, COUNT>(memory, exact, leaf, groups, counters);
+        }
+    }
+
+    #[inline(always)]
+    fn finish(&self, memory: &mut Memory, exact: &Exact, counters: &mut Counters) {
+        while let Some((leaf, groups)) = memory.due.take() {
+            self.read::<N, ANY, EXACT, COUNT>(memory, exact, leaf, groups, counters);
+        }
+    }
+}
+
+impl Blocks<'_> {
+    /// Puts the triangles of a leaf to those that wait to be set up.
+    #[inline(always)]
+    fn read<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool>(
+        &self,
+        memory: &mut Memory,
+        exact: &Exact,
+        leaf: Child,
+        groups: u64,
+        counters: &mut Counters,
+    ) {
         let count = usize::from(leaf.count);
         if COUNT {
             counters.leaves += 1;
@@ -241,13 +268,13 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
     for Instances<'_>
 {
     #[inline(always)]
-    fn fetch(&self, nodes: &[Node<f32, WIDTH>], child: Child) {
-        if !child.is_leaf() {
-            return prefetch(nodes, child.index as usize);
+    fn fetch(&self, node: &Node<f32, WIDTH>, mut leaves: u32) {
+        while leaves != 0 {
+            let inst = self.0.top_leaves[node.child(slot(leaves.trailing_zeros())).index as usize] as usize;
+            leaves &= leaves - 1;
+            prefetch(&self.0.instances, inst);
+            prefetch(&self.0.traced.placements, inst);
         }
-        let inst = self.0.top_leaves[child.index as usize] as usize;
-        prefetch(&self.0.instances, inst);
-        prefetch(&self.0.traced.placements, inst);
     }
 
     #[inline(always)]
@@ -275,4 +302,7 @@ impl<const N: usize, const ANY: bool, const EXACT: bool, const COUNT: bool> Leav
         memory.slabs.enter();
         descend::<N, ANY, EXACT, COUNT>(memory, exact, &view, &leaves, groups, counters);
     }
+
+    #[inline(always)]
+    fn finish(&self, _memory: &mut Memory, _exact: &Exact, _counters: &mut Counters) {}
 }
