@@ -58,7 +58,7 @@ const SPREAD: f64 = 0.25;
 const PLAIN_SPREAD: f64 = 1.0 / 64.0;
 
 /// How many vectors ahead the memory is asked for rays.
-const AHEAD: usize = 4;
+const AHEAD: usize = 8;
 
 /// Octants of directions.
 const OCTANTS: usize = 8;

@@ -11,8 +11,8 @@ use crate::lanes::words::prefetch_for_later;
 use crate::lanes::{Column, Lanes, Lanes3};
 use crate::ray::{Packet, Rays};
 
-/// Groups between the one that is read (or written) and the one the memory is asked for.
-pub const AHEAD: usize = 8;
+/// Groups between the one that is read and the one the memory is asked for.
+pub const AHEAD: usize = 16;
 
 /// Groups of the next block that the memory is asked for at each step of a tile's way.
 const AT_ONCE: usize = 4;

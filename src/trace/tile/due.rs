@@ -1,15 +1,15 @@
 //! Leaves that were met and are not read yet: their triangles are on their way from memory while the tile goes on.
 //!
 //! To ask for all leaves of a node when it is opened asks for many that are never visited, and for more lines at once than can be
-//! under way: everything else waits for them, too. Each is asked for when it is met, and read when some more are.
+//! under way: everything else waits for them, too. Each is asked for when it is met, and read when the next is.
 
 use crate::bvh::Child;
 
 /// Room for leaves that wait.
 const ROOM: usize = 8;
 
-/// Leaves that wait.
-const FEW: usize = 2;
+/// Leaves that wait: what is found late is found by boxes that need not have been opened.
+const FEW: usize = 1;
 
 /// Leaves that wait where triangles are so small that most are left out: less is done for each of them.
 const MANY: usize = 6;

@@ -90,6 +90,9 @@ const BLOCK: usize = GROUPS * V::N;
 /// Groups up to which a call is left to the packet kernel: to look for what their rays have in common takes as long as to trace them.
 const FEW: usize = 3;
 
+/// Groups between the one whose answers are written and the one for whose answers the memory is asked.
+const ANSWERS_AHEAD: usize = 8;
+
 /// Half the distance from 1 to the next number: the largest relative error of one operation.
 const HALF_ULP: f32 = f32::EPSILON / 2.0;
 
@@ -343,7 +346,7 @@ impl<'a> Job<'a> {
         exact.next.ask_sample();
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
             if !self.past {
-                self.output.prefetch(bundle.first + (g + AHEAD) * V::N);
+                self.output.prefetch(bundle.first + (g + ANSWERS_AHEAD) * V::N);
             }
             self.finish::<ANY, EXACT, COUNT>(&exact, g);
         }
