@@ -1,8 +1,8 @@
 //! The flat node: eight children for all engines, sixteen for streams and tiles where registers hold as many.
 
+use crate::lanes::words::zeros;
 use crate::lanes::{Real, each};
 use crate::math::Aabb;
-use wide::u8x16;
 
 /// Children per node.
 pub const WIDTH: usize = 8;
@@ -88,9 +88,7 @@ impl<S: Real, const W: usize> Node<S, W> {
     /// Children that are inner nodes, as bits; slots that are not in use look like such.
     #[inline(always)]
     pub fn inner(&self) -> u32 {
-        let mut counts = [u8::MAX; WIDE];
-        counts[..W].copy_from_slice(&self.count);
-        u8x16::new(counts).simd_eq(u8x16::ZERO).to_bitmask()
+        zeros(&self.count)
     }
 
     /// Reference to a child.

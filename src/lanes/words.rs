@@ -4,7 +4,7 @@
 #![allow(unsafe_code, reason = "instructions no crate offers as safe functions")]
 
 use super::{LaneMask, Lanes, Real};
-use wide::{f32x4, f32x8, f32x16, u16x8, u32x16};
+use wide::{f32x4, f32x8, f32x16, u8x16, u16x8, u32x16};
 
 /// The lower and the upper half.
 #[inline(always)]
@@ -28,6 +28,15 @@ pub fn positions(list: &[u32; 16], wanted: u32) -> u32 {
 #[inline(always)]
 pub fn below(number: u32, list: &[u32; 16]) -> u32 {
     u32x16::splat(number).simd_lt(u32x16::new(*list)).to_bitmask()
+}
+
+/// Positions of zeros among at most sixteen bytes, as bits.
+#[inline(always)]
+pub fn zeros<const N: usize>(bytes: &[u8; N]) -> u32 {
+    const { assert!(N <= 16) };
+    let mut all = [u8::MAX; 16];
+    all[..N].copy_from_slice(bytes);
+    u8x16::new(all).simd_eq(u8x16::ZERO).to_bitmask()
 }
 
 /// Asks the memory for element `i` of a list, which is wanted soon. Changes nothing but the time that takes.
@@ -255,8 +264,6 @@ pub fn transpose_bits<const K: usize>(planes: [u32; K]) -> [u8; 16] {
 #[cfg(any(test, not(all(target_feature = "avx512bw", target_feature = "avx512vl"))))]
 #[inline(always)]
 fn transpose_bits_by_bytes<const K: usize>(planes: [u32; K]) -> [u8; 16] {
-    use wide::u8x16;
-
     const PLACES: u8x16 = u8x16::new([1, 2, 4, 8, 16, 32, 64, 128, 1, 2, 4, 8, 16, 32, 64, 128]);
     let eight = |byte: u32| u64::from(byte & 0xff) * 0x0101_0101_0101_0101;
     let numbers = planes.iter().enumerate().fold(u8x16::ZERO, |all, (k, &plane)| {
@@ -275,6 +282,18 @@ fn transpose_bits_portable<const K: usize>(planes: [u32; K]) -> [u8; 16] {
 mod tests {
     use super::*;
     use crate::lanes::tests::numbers;
+
+    #[test]
+    fn zeros_are_where_bytes_are_zero() {
+        let mut next = numbers();
+        for _ in 0..100 {
+            let bytes: [u8; 16] = std::array::from_fn(|_| (next() % 3) as u8 * 127);
+            let want = |bytes: &[u8]| bytes.iter().rev().fold(0, |bits, &b| bits << 1 | u32::from(b == 0));
+            assert_eq!(zeros(&bytes), want(&bytes));
+            let eight: [u8; 8] = bytes[4..12].try_into().unwrap();
+            assert_eq!(zeros(&eight), want(&eight));
+        }
+    }
 
     #[test]
     fn the_least_key_is_the_first_of_the_least() {
