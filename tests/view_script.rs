@@ -296,6 +296,35 @@ fn an_edit_is_seen() {
     assert!(b == want, "the picture after the edit is the rendered one");
 }
 
+/// Many editors empty a file before they write it, and an empty scene is a scene: not this one. Where the system tells when a file is
+/// closed.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_slow_save_is_seen_when_it_is_over() {
+    let dir = folder("wait\nreload 30\nsave seen.exr\nreload 1\n");
+    let scene = dir.path().join("scene.kdl");
+    std::fs::write(&scene, SCENE.replace("RADIUS", "1.2")).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
+        .args(["view", "scene.kdl", "--size", "60x50", "--headless-script", "script.txt"])
+        .current_dir(dir.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the binary");
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut next = || serde_json::from_str::<Value>(&lines.next().expect("a line").unwrap()).unwrap();
+    assert_eq!(next()["command"], "wait");
+    let mut file = std::fs::File::create(&scene).unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    std::io::Write::write_all(&mut file, SCENE.replace("RADIUS", "1.35").as_bytes()).unwrap();
+    drop(file);
+    let reload = next();
+    assert_eq!((&reload["changed"], &reload["error"]), (&true.into(), &Value::Null), "{reload}");
+    assert_eq!(next()["changed"], false, "there was one change");
+    assert!(child.wait().unwrap().success());
+    let want = render(dir.path(), "scene.kdl --size 60x50");
+    assert!(exr::read(&dir.path().join("seen.exr")).unwrap() == want, "the picture of the whole file");
+}
+
 /// `set` is what `--set` is, in a scene that stays open; a mistake keeps the picture.
 #[test]
 fn a_parameter_is_set() {

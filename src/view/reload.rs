@@ -3,11 +3,13 @@
 //! A scene refers to files of its own folder, so that folder is watched as a whole; whether a change matters is told by the
 //! scene's hash, which covers every file that determines it.
 
-use std::path::Path;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use notify::event::{AccessKind, AccessMode, ModifyKind};
 use notify::{Event, EventKind, RecommendedWatcher, RecursiveMode, Watcher};
 
 use super::stage::Stage;
@@ -18,6 +20,11 @@ use crate::scene::parameter::Parameter;
 const QUIET: Duration = Duration::from_millis(5);
 /// Changes that do not end (a slider is dragged) are taken up after so long.
 const PATIENCE: Duration = Duration::from_millis(30);
+/// A file that is being written is waited for so long, where the system tells when it is closed. Many editors empty a file
+/// before they write it, and an empty scene is a scene.
+const CLOSING: Duration = Duration::from_secs(1);
+/// Whether the system tells when a file that was written is closed.
+const CLOSES_ARE_TOLD: bool = cfg!(any(target_os = "linux", target_os = "android"));
 /// Time between two looks at whether to stop.
 const POLL: Duration = Duration::from_millis(20);
 
@@ -27,12 +34,22 @@ pub type Setting = (String, String);
 /// Opens the scene with the parameters set, and the one before to build upon; `None` if it is the same.
 pub type Open = Box<dyn Fn(&[Setting], Option<&dyn Stage>) -> Result<Option<Arc<dyn Stage>>> + Send + Sync>;
 
+/// What has happened.
+enum Change {
+    /// A parameter was set, or a file is there, gone, or another.
+    Made,
+    /// Something was written to a file, and more may follow.
+    Written(PathBuf),
+    /// A file that could be written was closed.
+    Closed(PathBuf),
+}
+
 /// Where a scene comes from.
 pub struct Source {
     open: Open,
     settings: Mutex<Vec<Setting>>,
-    changed: Sender<Instant>,
-    changes: Mutex<Receiver<Instant>>,
+    changed: Sender<(Instant, Change)>,
+    changes: Mutex<Receiver<(Instant, Change)>>,
     /// Watches the files; it ends with this.
     watcher: Option<RecommendedWatcher>,
 }
@@ -63,13 +80,13 @@ impl Source {
         settings.retain(|(known, _)| known != name);
         settings.push((name.into(), value.to_string()));
         // The receiver lives as long as the sender.
-        let _always = self.changed.send(Instant::now());
+        let _always = self.changed.send((Instant::now(), Change::Made));
     }
 
     /// Takes back what was set.
     pub fn unset(&self) {
         locked(&self.settings).clear();
-        let _always = self.changed.send(Instant::now());
+        let _always = self.changed.send((Instant::now(), Change::Made));
     }
 
     /// The parameters of `stage` as they are wanted by now.
@@ -90,8 +107,16 @@ impl Source {
         loop {
             let left = limit.saturating_duration_since(Instant::now());
             match changes.recv_timeout(left.min(POLL)) {
-                Ok(first) => {
-                    while first.elapsed() < PATIENCE && changes.recv_timeout(QUIET).is_ok() {}
+                Ok((first, change)) => {
+                    let mut unfinished = HashSet::new();
+                    change.note(&mut unfinished);
+                    loop {
+                        let (patience, quiet) =
+                            if unfinished.is_empty() { (PATIENCE, QUIET) } else { (CLOSING, CLOSING) };
+                        let left = patience.saturating_sub(first.elapsed());
+                        let Ok((_, change)) = changes.recv_timeout(left.min(quiet)) else { break };
+                        change.note(&mut unfinished);
+                    }
                     return Some(first);
                 }
                 Err(RecvTimeoutError::Timeout) if left > Duration::ZERO && !stopped() => {}
@@ -106,15 +131,30 @@ impl Source {
     }
 }
 
-fn watch(file: &Path, sender: Sender<Instant>) -> Result<RecommendedWatcher> {
+impl Change {
+    /// Keeps the files that are being written.
+    fn note(self, unfinished: &mut HashSet<PathBuf>) {
+        match self {
+            Self::Written(file) if CLOSES_ARE_TOLD => unfinished.insert(file),
+            Self::Closed(file) => unfinished.remove(&file),
+            Self::Made | Self::Written(_) => false,
+        };
+    }
+}
+
+fn watch(file: &Path, sender: Sender<(Instant, Change)>) -> Result<RecommendedWatcher> {
     let failed = |e: notify::Error| Error::io(file, std::io::Error::other(e));
     let changed = move |event: notify::Result<Event>| {
-        let matters = |event: &Event| {
-            matches!(event.kind, EventKind::Create(_) | EventKind::Modify(_) | EventKind::Remove(_) | EventKind::Any)
+        let Ok(event) = event else { return };
+        let change: fn(PathBuf) -> Change = match event.kind {
+            EventKind::Modify(ModifyKind::Data(_)) => Change::Written,
+            EventKind::Access(AccessKind::Close(AccessMode::Write)) => Change::Closed,
+            EventKind::Create(_) | EventKind::Modify(_) | EventKind::Remove(_) | EventKind::Any => |_| Change::Made,
+            EventKind::Access(_) | EventKind::Other => return,
         };
-        if event.as_ref().is_ok_and(matters) {
+        for path in event.paths {
             // Nobody listens any more: the view is closing.
-            let _closed = sender.send(Instant::now());
+            let _closed = sender.send((Instant::now(), change(path)));
         }
     };
     let mut watcher = notify::recommended_watcher(changed).map_err(failed)?;
