@@ -7,13 +7,14 @@ mod binary;
 use std::process::Command;
 use std::time::Duration;
 
-use binary::watch::Running;
+use binary::watch::{Running, until_it_listens};
 use binary::{Ended, files, lanecast};
 use lanecast::film::{exr, png};
 
 const LIMIT: Duration = Duration::from_secs(50);
 
 fn interrupt(running: &Running) {
+    until_it_listens(running.id());
     let sent = Command::new("kill").args(["-INT", &running.id().to_string()]).status().expect("kill");
     assert!(sent.success());
 }

@@ -439,6 +439,7 @@ fn an_interrupted_bench_ends_with_130_and_valid_output() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the binary runs");
+    binary::watch::until_it_listens(child.id());
     std::thread::sleep(std::time::Duration::from_millis(700));
     let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
     assert!(sent.success());

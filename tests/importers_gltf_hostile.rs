@@ -323,7 +323,7 @@ fn mutations_never_panic() {
             }
             Err(error) => assert!(error.to_string().len() < 1000, "a long message"),
         }
-        assert!(start.elapsed() < Duration::from_secs(2));
+        assert!(start.elapsed() < Duration::from_secs(10));
     }
     println!("gltf: {read} of {rounds} mutated files were read");
     assert!(rounds == 0 || (read > rounds / 100 && read < rounds - rounds / 100), "{read}");

