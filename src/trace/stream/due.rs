@@ -1,4 +1,4 @@
-//! Rays that wait to be tested against triangles (any-hit).
+//! Rays that wait to be tested against triangles by the plain test.
 //!
 //! Most leaves are met by one ray of a chunk or two, and whether these hit something is a surprise every time. Rays of several
 //! leaves together are one loop, whose parts do not wait for each other, and the blocks have come from memory by then. A ray goes
@@ -6,7 +6,7 @@
 
 use super::chunk::{Chunk, RAYS, Set};
 use super::walk::Walk;
-use super::{leaf, sift};
+use super::leaf;
 use crate::bvh::Child;
 use crate::lanes::{Lanes, Real};
 use crate::scene::world::Object;
@@ -16,8 +16,11 @@ use crate::shape::sieve::{Sieve, beside};
 /// From this many rays on a block is tested at once.
 pub const FEW: u32 = 4;
 
-/// Pairs of a ray and a block that are tested together.
+/// Pairs of a ray and a block that are tested together, any-hit.
 const TOGETHER: usize = 32;
+
+/// The same for closest hits, which cut short the way of their rays.
+const CLOSEST: usize = 8;
 
 /// Most pairs that are listed.
 const ROOM: usize = TOGETHER + FEW as usize;
@@ -41,7 +44,7 @@ impl Default for Due {
 impl Due {
     /// Adds less than [`FEW`] rays with the block that `leaf` refers to; whether it is time to test them all.
     #[inline(always)]
-    pub fn add(&mut self, leaf: Child, rays: Set) -> bool {
+    pub fn add<const ANY: bool>(&mut self, leaf: Child, rays: Set) -> bool {
         let (at, mut rest) = (self.len.min(TOGETHER), rays);
         // As if there were as many as there may be: how many there are is a surprise.
         for at in at..at + FEW as usize - 1 {
@@ -49,7 +52,7 @@ impl Due {
             rest &= rest.wrapping_sub(1);
         }
         self.len = at + rays.count_ones() as usize;
-        self.len >= TOGETHER
+        self.len >= if ANY { TOGETHER } else { CLOSEST }
     }
 
     /// Whether none wait.
@@ -61,7 +64,12 @@ impl Due {
 
 /// Tests all pairs that wait, two at once where a register holds as many lanes.
 #[inline(never)]
-pub fn test<S: Real, const COUNT: bool>(object: &Object<S>, inst: u32, chunk: &Chunk<S>, walk: &mut Walk<S>) {
+pub fn test<S: Real, const ANY: bool, const COUNT: bool>(
+    object: &Object<S>,
+    inst: u32,
+    chunk: &Chunk<S>,
+    walk: &mut Walk<S>,
+) {
     let Walk { due, best, sifted, counters, .. } = walk;
     sifted.clear();
     let (len, beside_it) = (due.len.min(ROOM), usize::from(S::Children::N > BLOCK));
@@ -73,15 +81,13 @@ pub fn test<S: Real, const COUNT: bool>(object: &Object<S>, inst: u32, chunk: &C
         let (first, second) = (block(pair), block(other));
         let sieve = Sieve::<S::Children>::new(|f| beside(&first.fields[f], &second.fields[f]));
         let rays = [ray(pair), ray(other)];
-        let sieved = sieve.test::<true>(&chunk.beside(&best.t, rays[0], rays[1]));
+        let sieved = sieve.test::<ANY>(&chunk.beside(&best.t, rays[0], rays[1]));
         let lanes = lanes(pair) | if other > pair { lanes(other) << BLOCK } else { 0 };
-        sifted.add::<_, true>([pair, other], rays, (&sieved, lanes), best);
+        sifted.add::<_, ANY>([pair, other], rays, (&sieved, lanes), best);
     }
     if COUNT {
         (0..len).for_each(|pair| leaf::count(counters, due.count[pair], 1));
     }
-    for (pair, slots) in sifted.rest() {
-        sift::doubtful::<S, true>(block(pair), inst, chunk, best, ray(pair), slots);
-    }
+    sifted.settle::<ANY>(|pair| (block(pair), ray(pair)), inst, chunk, best);
     due.len = 0;
 }

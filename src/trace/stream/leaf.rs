@@ -36,9 +36,9 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
         return;
     }
     if walk.sieve {
-        if ANY && rays.count_ones() < due::FEW {
-            if walk.due.add(child, rays) {
-                due::test::<V::Scalar, COUNT>(object, inst, chunk, walk);
+        if rays.count_ones() < due::FEW {
+            if walk.due.add::<ANY>(child, rays) {
+                due::test::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk);
             }
         } else {
             sift::block::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk, child, rays);

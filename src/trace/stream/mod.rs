@@ -4,8 +4,8 @@
 //! a bit per ray for every box on the stack. At a node rays are tested one by one against eight or sixteen boxes, or,
 //! where many rays are left and few boxes, as vectors of rays against one box after the other; in both cases a loop of
 //! known length replaces the branches of one ray's own traversal, which are what incoherent rays spend their time on. At a
-//! leaf likewise; where few any-hit rays meet one, they wait for those of other leaves ([`due`]). Vectors of rays that are
-//! coherent after all go to the packet kernel, unless triangles are known to be too fine for that ([`Job::apart`]); among
+//! leaf likewise; where few rays meet one and the plain test is asked, they wait for those of other leaves ([`due`]). Vectors of
+//! rays that are coherent after all go to the packet kernel, unless triangles are known to be too fine for that ([`Job::apart`]); among
 //! shapes, blocks of such vectors go down the tree together; short any-hit rays may go unsorted ([`neighbours`]). The
 //! kernels and so the hits are those of the other generic engines, bit by bit: a sieve settles what is certain ([`sift`]). For tiles,
 //! which have an arithmetic of their own, it also says where ([`Job::plain`]).

@@ -79,14 +79,44 @@ impl<S: Real> Sifted<S> {
         self.len = at + usize::from(possible != 0);
     }
 
-    /// The rays that something is left to do for, as the caller knows them, and the triangles, as bits.
+    /// Does what is left to do; `of`: the block and the ray that the caller means.
     #[inline(always)]
-    pub fn rest(&self) -> impl Iterator<Item = (usize, u32)> {
-        (0..self.len.min(TESTS) * BESIDE).filter_map(|at| {
-            let (test, half) = (at / BESIDE, at % BESIDE);
-            let slots = u32::from(self.possible[test]) >> (BLOCK * half) & 0xff;
-            (slots != 0).then_some((self.of[test][half].into(), slots))
-        })
+    pub fn settle<'a, const ANY: bool>(
+        &self,
+        of: impl Fn(usize) -> (&'a Block<S, 9>, usize),
+        inst: u32,
+        chunk: &Chunk<S>,
+        best: &mut Best<S>,
+    ) {
+        for test in 0..self.len.min(TESTS) {
+            let possible = u32::from(self.possible[test]);
+            if ANY {
+                for half in 0..BESIDE {
+                    let slots = possible >> (BLOCK * half) & 0xff;
+                    if slots != 0 {
+                        let (block, ray) = of(self.of[test][half].into());
+                        doubtful::<S, ANY>(block, inst, chunk, best, ray, slots);
+                    }
+                }
+                continue;
+            }
+            let mut rest = possible;
+            while rest != 0 {
+                let lane = rest.trailing_zeros() as usize & (MAX_LANES - 1);
+                rest &= rest - 1;
+                let ((block, ray), slot) = (of(self.of[test][lane / BLOCK].into()), lane % BLOCK);
+                if self.certain[test] >> lane & 1 == 0 {
+                    doubtful::<S, ANY>(block, inst, chunk, best, ray, 1 << slot);
+                    continue;
+                }
+                let [way, speed, v, w] = [0, 1, 2, 3].map(|k| self.numbers[test][k][lane]);
+                let inverse = S::ONE / speed;
+                let t = moved(chunk, ray, (block, slot), way * inverse);
+                if chunk.t_min[ray] <= t {
+                    best.offer(ray, [t, v * inverse, w * inverse], block.prim[slot], inst);
+                }
+            }
+        }
     }
 }
 
@@ -124,30 +154,7 @@ pub fn block<S: Real, const ANY: bool, const COUNT: bool>(
     if COUNT {
         leaf::count(walk.counters, child.count, rays.count_ones());
     }
-    if ANY {
-        for (ray, slots) in sifted.rest() {
-            doubtful::<S, ANY>(block, inst, chunk, best, ray & (RAYS - 1), slots);
-        }
-        return;
-    }
-    for test in 0..sifted.len.min(TESTS) {
-        let mut rest = u32::from(sifted.possible[test]);
-        while rest != 0 {
-            let lane = rest.trailing_zeros() as usize & (MAX_LANES - 1);
-            rest &= rest - 1;
-            let (ray, slot) = (usize::from(sifted.of[test][lane / BLOCK]) & (RAYS - 1), lane % BLOCK);
-            if sifted.certain[test] >> lane & 1 == 0 {
-                doubtful::<S, ANY>(block, inst, chunk, best, ray, 1 << slot);
-                continue;
-            }
-            let [way, speed, v, w] = [0, 1, 2, 3].map(|k| sifted.numbers[test][k][lane]);
-            let inverse = S::ONE / speed;
-            let t = moved(chunk, ray, (block, slot), way * inverse);
-            if chunk.t_min[ray] <= t {
-                best.offer(ray, [t, v * inverse, w * inverse], block.prim[slot], inst);
-            }
-        }
-    }
+    sifted.settle::<ANY>(|ray| (block, ray & (RAYS - 1)), inst, chunk, best);
 }
 
 /// A parameter moved into the box of a triangle, as the common formula does.

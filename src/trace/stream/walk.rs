@@ -242,8 +242,8 @@ impl<'a, S: Real> Walk<'a, S> {
                 leaf::block::<V, ANY, COUNT>(object, inst, chunk, walk, child, rays);
             },
         );
-        if ANY && !self.due.is_empty() {
-            due::test::<S, COUNT>(object, inst, chunk, self);
+        if !self.due.is_empty() {
+            due::test::<S, ANY, COUNT>(object, inst, chunk, self);
         }
     }
 
