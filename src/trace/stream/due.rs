@@ -5,8 +5,8 @@
 //! on through the tree meanwhile, in vain if it hits something; so not many wait.
 
 use super::chunk::{Chunk, RAYS, Set};
-use super::walk::Walk;
 use super::leaf;
+use super::walk::Walk;
 use crate::bvh::Child;
 use crate::lanes::{Lanes, Real};
 use crate::scene::world::Object;
