@@ -1,6 +1,7 @@
 //! What the rays of a chunk have found.
 
 use super::chunk::{RAYS, Set};
+use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes, Real};
 use crate::ray::{Candidate, HitPacket, Hits, INVALID_ID};
 use crate::scene::world::Names;
@@ -53,6 +54,21 @@ impl<S: Real> Best<S> {
         }
         let half = |half: usize| self.t[64 * half..].first_chunk().map_or(0, |of| near.reached(of));
         Set::from(half(0)) | if len > 64 { Set::from(half(1)) << 64 } else { 0 }
+    }
+
+    /// Of the first `len` rays those with a hit, closest-hit.
+    #[inline(always)]
+    pub fn found(&self, len: usize) -> Set {
+        let some = |first: usize| {
+            self.prim[first..].first_chunk().map_or(0, |of| Set::from(!positions(of, INVALID_ID) & 0xffff))
+        };
+        (0..len.min(RAYS)).step_by(16).fold(0, |found, first| found | some(first) << first)
+    }
+
+    /// Parameter, weights and primitive of the hit of ray `i`.
+    #[inline(always)]
+    pub fn numbers(&self, i: usize) -> (S, S, S, u32) {
+        (self.t[i], self.u[i], self.v[i], self.prim[i])
     }
 
     /// The hits of rays `at..at + N`.

@@ -20,7 +20,7 @@ pub const FEW: u32 = 4;
 const TOGETHER: usize = 32;
 
 /// The same for closest hits, which cut short the way of their rays.
-const CLOSEST: usize = 8;
+const CLOSEST: usize = 6;
 
 /// Most pairs that are listed.
 const ROOM: usize = TOGETHER + FEW as usize;

@@ -46,7 +46,7 @@ use block::Block;
 use chunk::{Chunk, RAYS};
 use inside::Inside;
 use signs::{Signs, is_narrow};
-pub use visitors::{MOST, Visitors};
+pub use visitors::{Visit, Visitors, bring_in};
 
 /// Rays that are sorted together.
 pub const SOURCE: usize = 4096;

@@ -216,7 +216,7 @@ pub fn decide<const ANY: bool, const MANY: bool>(
         let (at, place) = ((batch.slot[i] >> 3) as usize, (batch.slot[i] & 7) as usize);
         block.set(0, blocks[at].get(place), id.prim);
         let segments = exact.bundle.segments(g);
-        match shapes::enter(exact, id.inst, &segments, V::splat(f32::INFINITY), (exact.bundle.tame[g], true)) {
+        match shapes::enter(exact, id.inst, &segments, exact.bundle.tame[g]) {
             Some(entered) => entered,
             None => return false,
         }

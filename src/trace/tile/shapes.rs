@@ -14,9 +14,10 @@ use crate::lanes::words::positions;
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::slab::Interval;
 use crate::ray::{Counters, HitPacket, INVALID_ID, Packet};
-use crate::scene::world::Object;
+use crate::scene::world::{Instance, Object};
 use crate::trace::leaf;
 use crate::trace::query::{Query, Stack};
+use crate::trace::stream::bring_in;
 
 impl Groups {
     /// The rays of a group and their ends: those of a pencil are made once, however many instances they go into.
@@ -34,32 +35,33 @@ impl Groups {
     }
 }
 
-/// The rays of a group, `segments`, in the space of an instance, their ends or `limit`, whichever is nearer, and those of `lanes`
-/// that meet its box; `None` if none does. `sheared`: see [`Packet::prepared`].
+/// How far the rays of a group, `segments`, go at an instance: their ends or `limit`, whichever is nearer; where they enter its box,
+/// and those of `lanes` that meet it.
 #[inline(always)]
-pub fn enter(
-    exact: &Exact,
-    inst: u32,
-    segments: &Segments,
-    limit: V,
-    (lanes, sheared): (u32, bool),
-) -> Option<(Packet<V>, V, u32)> {
+pub fn reach(instance: &Instance<f32>, segments: &Segments, limit: V, lanes: u32) -> (V, V, u32) {
     let Segments { org, dir, t_min, t_max } = *segments;
     // What is no number limits nothing.
     let t_max = limit.fast_min(t_max);
-    let instance = &exact.world.instances[inst as usize];
     if instance.identity {
-        return (lanes != 0).then(|| (Packet::prepared(org, dir, t_min, sheared), t_max, lanes));
+        return (t_max, V::splat(f32::MIN), lanes);
     }
     let packet = Packet::unsheared(org, dir, t_min);
     let interval = Interval::of(&packet, instance.bounds.lo, instance.bounds.hi);
-    let lanes = interval.meets(t_min, t_max).bits() & lanes;
+    (t_max, interval.near, interval.meets(t_min, t_max).bits() & lanes)
+}
+
+/// The rays of a group, `segments`, in the space of an instance, their ends, and those of `lanes` that meet its box; `None` if none
+/// does.
+#[inline(always)]
+pub fn enter(exact: &Exact, inst: u32, segments: &Segments, lanes: u32) -> Option<(Packet<V>, V, u32)> {
+    let Segments { org, dir, t_min, .. } = *segments;
+    let instance = &exact.world.instances[inst as usize];
+    let (t_max, near, lanes) = reach(instance, segments, V::splat(f32::INFINITY), lanes);
     if lanes == 0 {
         return None;
     }
-    let local = packet.brought_in(&instance.to_local, interval.near, sheared);
-    // A direction may overflow on the way in.
-    let lanes = lanes & local.finite_lanes();
+    let (local, inside) = bring_in([org, dir], [t_min, near], instance, true);
+    let lanes = lanes & inside;
     (lanes != 0).then_some((local, t_max, lanes))
 }
 
@@ -81,7 +83,7 @@ pub fn visit<const N: usize, const ANY: bool, const COUNT: bool>(
         let tame = exact.bundle.tame[g];
         let lanes = tame & !groups.done(g, tame);
         let segments = groups.segments(exact.bundle, g);
-        let Some((packet, t_max, lanes)) = enter(exact, inst, &segments, V::splat(f32::INFINITY), (lanes, true)) else {
+        let Some((packet, t_max, lanes)) = enter(exact, inst, &segments, lanes) else {
             continue;
         };
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), stack, counters);

@@ -52,7 +52,7 @@ struct Instances<'a>(&'a World<f32>);
 
 /// Triangles per ray from which on an instance is seen so small that its triangles have few rays in common: the stream kernel is
 /// the faster way through it.
-const FINE: f32 = 1.5;
+const FINE: f32 = 2.5;
 
 /// Groups up to which the box of an instance is tested against their single rays in any case: to enter it costs several times as
 /// much.
