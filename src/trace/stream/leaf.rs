@@ -36,7 +36,9 @@ pub fn block<V: Lanes, const ANY: bool, const COUNT: bool>(
         return;
     }
     if walk.sieve {
-        if rays.count_ones() < due::FEW {
+        // Closest hits only where two rays fit a register: else they wait for nothing.
+        let may_wait = ANY || const { <<V::Scalar as Real>::Children as Lanes>::N > BLOCK };
+        if may_wait && rays.count_ones() < due::FEW {
             if walk.due.add::<ANY>(child, rays) {
                 due::test::<V::Scalar, ANY, COUNT>(object, inst, chunk, walk);
             }
