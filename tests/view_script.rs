@@ -4,7 +4,7 @@ mod binary;
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use binary::{Ended, SQUARE, files, lanecast, refused};
 use lanecast::film::{Film, exr};
@@ -23,6 +23,19 @@ fn view(dir: &Path, line: &str) -> Vec<Value> {
     let Ended { code, out, err } = lanecast(dir, &line.split(' ').collect::<Vec<_>>());
     assert_eq!(code, Some(0), "{line}: {err}");
     out.lines().map(|line| serde_json::from_str(line).expect("an object per line")).collect()
+}
+
+/// A view that goes on, and what says its next line.
+fn begun(dir: &Path, scene: &str, size: &str) -> (Child, impl FnMut() -> Value) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
+        .args(["view", scene, "--size", size, "--headless-script", "script.txt"])
+        .current_dir(dir)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary");
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    (child, move || serde_json::from_str(&lines.next().expect("a line").unwrap()).unwrap())
 }
 
 fn render(dir: &Path, line: &str) -> Film {
@@ -231,14 +244,7 @@ fn shaders_that_rt_does_not_know_are_refused_when_a_file_brings_them() {
         std::fs::rename(new, file).unwrap();
     };
     write("plastic");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
-        .args(["view", "ball.asc", "--size", "16x16", "--headless-script", "script.txt"])
-        .current_dir(dir.path())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the binary");
-    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    let mut next = || serde_json::from_str::<Value>(&lines.next().expect("a line").unwrap()).unwrap();
+    let (mut child, mut next) = begun(dir.path(), "ball.asc", "16x16");
     assert_eq!(next()["command"], "wait");
     write("wood");
     let reload = next();
@@ -263,15 +269,7 @@ fn an_edit_is_seen() {
     let scene = dir.path().join("scene.kdl");
     let write = |radius: &str| std::fs::write(&scene, SCENE.replace("RADIUS", radius)).unwrap();
     write("1.2");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
-        .args(["view", "scene.kdl", "--size", "60x50", "--headless-script", "script.txt"])
-        .current_dir(dir.path())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the binary");
-    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    let mut next = || serde_json::from_str::<Value>(&lines.next().expect("a line").unwrap()).unwrap();
+    let (mut child, mut next) = begun(dir.path(), "scene.kdl", "60x50");
     assert_eq!(next()["command"], "wait");
     write("1.35");
     let reload = next();
@@ -304,14 +302,7 @@ fn a_slow_save_is_seen_when_it_is_over() {
     let dir = folder("wait\nreload 30\nsave seen.exr\nreload 1\n");
     let scene = dir.path().join("scene.kdl");
     std::fs::write(&scene, SCENE.replace("RADIUS", "1.2")).unwrap();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_lanecast"))
-        .args(["view", "scene.kdl", "--size", "60x50", "--headless-script", "script.txt"])
-        .current_dir(dir.path())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the binary");
-    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    let mut next = || serde_json::from_str::<Value>(&lines.next().expect("a line").unwrap()).unwrap();
+    let (mut child, mut next) = begun(dir.path(), "scene.kdl", "60x50");
     assert_eq!(next()["command"], "wait");
     let mut file = std::fs::File::create(&scene).unwrap();
     std::thread::sleep(std::time::Duration::from_millis(200));
