@@ -18,6 +18,7 @@ mod ftz;
 pub mod functions;
 mod isa;
 pub mod marks;
+mod masked;
 pub mod minima;
 mod moved;
 mod pages;
@@ -141,6 +142,16 @@ pub trait Lanes:
         (low[0], high[0])
     }
 
+    /// `self < other` in the lanes of `mask`.
+    #[inline(always)]
+    fn cmp_lt_in(self, other: Self, mask: Self::Mask) -> Self::Mask {
+        mask & self.cmp_lt(other)
+    }
+    /// `self <= other` in the lanes of `mask`.
+    #[inline(always)]
+    fn cmp_le_in(self, other: Self, mask: Self::Mask) -> Self::Mask {
+        mask & self.cmp_le(other)
+    }
     /// `self > other`, false for NaN.
     #[inline(always)]
     fn cmp_gt(self, other: Self) -> Self::Mask {

@@ -67,6 +67,10 @@ fn check_width<V: Lanes>() {
                 assert_eq!(mask.any(), want != 0);
                 assert_eq!((!mask).bits() & V::ALL, !want & V::ALL);
             }
+            let among = V::Mask::from_bits(0b0110_1101_1010_0101 & V::ALL);
+            assert_eq!(va.cmp_lt_in(vb, among).bits(), va.cmp_lt(vb).bits() & among.bits());
+            assert_eq!(va.cmp_le_in(vb, among).bits(), va.cmp_le(vb).bits() & among.bits());
+            assert_eq!(va.cmp_le_in(vb, vb.cmp_lt(vc)).bits(), va.cmp_le(vb).bits() & vb.cmp_lt(vc).bits());
         }
     }
     let numbers: Vec<V::Scalar> =

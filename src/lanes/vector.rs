@@ -5,7 +5,9 @@ use bytemuck::cast;
 use wide::{f32x4, f32x8, f32x16, f64x2, f64x4, f64x8};
 use wide::{u32x4, u32x8, u32x16, u64x2, u64x4, u64x8};
 
-use super::{LaneMask, Lanes};
+use super::masked::{le_in, lt_in};
+use super::moved::{near_doubles, near_floats, packed_doubles, packed_floats};
+use super::{LaneMask, Lanes, MAX_LANES};
 
 /// A full-width mask in registers (all bits of a lane set or clear). AVX-512 builds keep it in a mask register.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +47,7 @@ fn hidden<V: bytemuck::Pod>(v: V) -> V {
 }
 
 macro_rules! vector_lanes {
-    ($v:ident, $s:ident, $n:literal, $int:ident, $bits:expr $(, $packed:path, $near:path)?) => {
+    ($v:ident, $s:ident, $n:literal, $int:ident, $bits:expr $(, { $($own:item)* })?) => {
         impl std::ops::BitAnd for VectorMask<$v> {
             type Output = Self;
             #[inline(always)]
@@ -156,16 +158,7 @@ macro_rules! vector_lanes {
             fn cmp_eq(self, other: Self) -> Self::Mask {
                 VectorMask(self.simd_eq(other))
             }
-            $(
-                #[inline(always)]
-                fn packed(self, bits: u32) -> Self {
-                    $packed(self, bits)
-                }
-                #[inline(always)]
-                fn near(from: &[$s], at: &[u32; super::MAX_LANES]) -> Self {
-                    $near(from.first_chunk().expect("two vectors' worth of values"), at)
-                }
-            )?
+            $($($own)*)?
         }
     };
 }
@@ -192,7 +185,33 @@ const fn powers64<const N: usize>() -> [u64; N] {
 
 vector_lanes!(f32x4, f32, 4, u32x4, const { powers32() });
 vector_lanes!(f32x8, f32, 8, u32x8, const { powers32() });
-vector_lanes!(f32x16, f32, 16, u32x16, const { powers32() }, super::moved::packed_floats, super::moved::near_floats);
+vector_lanes!(f32x16, f32, 16, u32x16, const { powers32() }, {
+    #[inline(always)]
+    fn packed(self, bits: u32) -> Self {
+        packed_floats(self, bits)
+    }
+    #[inline(always)]
+    fn near(from: &[f32], at: &[u32; MAX_LANES]) -> Self {
+        near_floats(from.first_chunk().expect("two vectors' worth of values"), at)
+    }
+    #[inline(always)]
+    fn cmp_lt_in(self, other: Self, mask: VectorMask<Self>) -> VectorMask<Self> {
+        VectorMask(lt_in(self, other, mask.0))
+    }
+    #[inline(always)]
+    fn cmp_le_in(self, other: Self, mask: VectorMask<Self>) -> VectorMask<Self> {
+        VectorMask(le_in(self, other, mask.0))
+    }
+});
 vector_lanes!(f64x2, f64, 2, u64x2, const { powers64() });
 vector_lanes!(f64x4, f64, 4, u64x4, const { powers64() });
-vector_lanes!(f64x8, f64, 8, u64x8, const { powers64() }, super::moved::packed_doubles, super::moved::near_doubles);
+vector_lanes!(f64x8, f64, 8, u64x8, const { powers64() }, {
+    #[inline(always)]
+    fn packed(self, bits: u32) -> Self {
+        packed_doubles(self, bits)
+    }
+    #[inline(always)]
+    fn near(from: &[f64], at: &[u32; MAX_LANES]) -> Self {
+        near_doubles(from.first_chunk().expect("two vectors' worth of values"), at)
+    }
+});

@@ -67,16 +67,11 @@ pub struct Met {
 }
 
 impl Met {
-    /// Whether some ray hit the triangle.
+    /// Whether some ray hit the triangle, and lanes that may have hit it and did not, which are for [`super::own::pair_doubtful`].
     #[inline(always)]
-    pub fn hit(&self) -> bool {
-        self.hit.any()
-    }
-
-    /// Lanes that may have hit it and did not: for [`super::own::pair_doubtful`].
-    #[inline(always)]
-    pub fn doubt(&self) -> Mask {
-        self.possible & !self.hit
+    pub fn told(&self) -> (bool, u32) {
+        let hit = self.hit.bits();
+        (hit != 0, self.possible.bits() ^ hit)
     }
 
     /// A number, as bits of `old` where nothing was hit. Numbers are moved as floats: selection copies bits.
@@ -84,6 +79,17 @@ impl Met {
     fn name(&self, new: u32, old: V) -> V {
         select(self.hit, V::splat(f32::from_bits(new)), old)
     }
+}
+
+/// Linear functions of a triangle at some rays.
+#[derive(Clone, Copy, Debug)]
+pub struct Values {
+    /// Edge functions.
+    edges: [V; 3],
+    /// 1/z in its plane.
+    inverse: V,
+    /// See [`Plane::behind`].
+    behind: V,
 }
 
 /// A set-up triangle, each number in all lanes; those that are not asked for are not read. See [`Planes`].
@@ -131,9 +137,24 @@ impl Plane {
     /// Its edges against some rays.
     #[inline(always)]
     pub fn edges(&self, line: &Line) -> Edges {
-        let (e0, e1, e2) = (line.at(self.linear[0]), line.at(self.linear[1]), line.at(self.linear[2]));
+        self.edges_of([0, 1, 2].map(|k| line.at(self.linear[k])))
+    }
+
+    #[inline(always)]
+    fn edges_of(&self, [e0, e1, e2]: [V; 3]) -> Edges {
         let least = e0.fast_min(e1).fast_min(e2);
         Edges { possible: self.outside.cmp_le(least), certain: self.inside.cmp_le(least), weights: [e1, e2] }
+    }
+
+    /// What [`Self::meet`] asks of some rays, whatever they found.
+    #[inline(always)]
+    pub fn values<const ANY: bool, const BEHIND: bool, const END: bool>(&self, line: &Line) -> Values {
+        let (zero, from_end) = (V::constant(0.0), ANY && END);
+        Values {
+            edges: [0, 1, 2].map(|k| line.at(self.linear[k])),
+            inverse: if from_end { zero } else { line.at(self.linear[3]) },
+            behind: if from_end || BEHIND { self.behind(line) } else { zero },
+        }
     }
 
     /// How far segments begin behind its plane as seen from their common point; in some unit.
@@ -148,19 +169,23 @@ impl Plane {
         ahead * self.rcp
     }
 
-    /// Tests some rays. `EARLY`: some segment ends before the common point.
+    /// Tests some rays, at which its functions are `values`. `EARLY`: some segment ends before the common point.
     ///
     /// With a common end (`END`, any-hit) rays start on surfaces, a few roundings in front of them. Depths from the far end
     /// cannot tell which side of its own surface a ray starts on; where the start lies with respect to the triangle's plane
     /// can. So it does where the common point is `BEHIND` the rays, and there it tells how far ahead they hit, too.
     #[inline(always)]
-    pub fn meet<const ANY: bool, const BEHIND: bool, const END: bool, const EARLY: bool>(&self, line: &Line) -> Met {
+    pub fn meet<const ANY: bool, const BEHIND: bool, const END: bool, const EARLY: bool>(
+        &self,
+        line: &Line,
+        values: &Values,
+    ) -> Met {
         let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
-        let Edges { mut possible, mut certain, weights } = self.edges(line);
+        let Edges { mut possible, mut certain, weights } = self.edges_of(values.edges);
         let mut ahead = zero;
         // What is certain is possible, too, so one maximum is all that the next triangle waits for.
         if ANY && END {
-            let is_ahead = zero.cmp_le(self.behind(line));
+            let is_ahead = zero.cmp_le(values.behind);
             (possible, certain) = (possible & is_ahead, certain & is_ahead);
             if EARLY {
                 let is_ahead = self.depth(line).cmp_le(line.front);
@@ -170,22 +195,22 @@ impl Plane {
             let best = raised(line.best, certain, infinite);
             return Met { hit: certain & waiting, possible: possible & waiting, best, weights, ahead };
         }
-        let inverse = self.depth(line);
+        let inverse = self.within(values.inverse);
         if BEHIND {
-            ahead = -self.behind(line);
+            ahead = -values.behind;
             let is_ahead = zero.cmp_le(ahead);
             (possible, certain) = (possible & is_ahead, certain & is_ahead);
         } else if EARLY {
             let is_ahead = inverse.cmp_le(line.front);
             (possible, certain) = (possible & is_ahead, certain & is_ahead);
         }
-        possible = possible & line.best.cmp_le(inverse);
+        possible = line.best.cmp_le_in(inverse, possible);
         if ANY {
             let hit = certain & possible;
             let best = raised(line.best, hit, infinite);
             return Met { hit, possible, best, weights, ahead };
         }
-        let hit = certain & line.best.cmp_lt(inverse);
+        let hit = line.best.cmp_lt_in(inverse, certain);
         let best = raised(line.best, certain, inverse);
         Met { hit, possible, best, weights, ahead }
     }

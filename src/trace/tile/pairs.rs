@@ -7,7 +7,8 @@ use super::groups::Groups;
 use super::held::{Held, Line, Plane};
 use super::listing::{self, triangles};
 use super::own::{self, Id, may_be_inside, pair_doubtful};
-use super::{GROUPS, Mask, Memory, V};
+use super::{GROUPS, Memory, V};
+use crate::lanes::chosen::one_ahead;
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::Counters;
 
@@ -129,41 +130,55 @@ fn test<
             if sure == 0 {
                 continue;
             }
-            let (mut held, mut hits, mut doubt) = (Held::of::<MANY>(groups, g), 0, Mask::from_bits(0));
-            for i in triangles(sure) {
-                if COUNT {
-                    count_pair(held.line.best, counters);
-                }
-                let plane = Plane::of(planes, i);
-                let met = plane.meet::<ANY, BEHIND, END, EARLY>(&held.line);
-                held.take::<ANY, MANY, BEHIND>(&plane, &met, id(i));
-                hits |= u32::from(met.hit()) << i;
-                doubt = doubt | met.doubt();
-            }
+            let (mut held, mut hits, mut doubt) = (Held::of::<MANY>(groups, g), 0, 0);
+            let plane = |i: usize| Plane::of(planes, i & (BATCH - 1));
+            one_ahead(
+                sure.into(),
+                &mut held,
+                |held, i| plane(i).values::<ANY, BEHIND, END>(&held.line),
+                |held, i, values| {
+                    if COUNT {
+                        count_pair(held.line.best, counters);
+                    }
+                    let plane = plane(i);
+                    let met = plane.meet::<ANY, BEHIND, END, EARLY>(&held.line, &values);
+                    held.take::<ANY, MANY, BEHIND>(&plane, &met, id(i & (BATCH - 1)));
+                    let (hit, more) = met.told();
+                    hits |= u32::from(hit) << i;
+                    doubt |= more;
+                },
+            );
             held.put::<ANY, MANY, BEHIND>(groups, g);
             tested.find(g, hits.count_ones());
-            again.add(g, if doubt.any() { sure } else { hits & unsteady }.into());
+            again.add(g, if doubt != 0 { sure } else { hits & unsteady }.into());
         }
     } else {
         for i in triangles(listing.seen() & !odd) {
             let (plane, id, met) = (Plane::of(planes, i), id(i), listing.groups(i));
-            let (mut hits, mut doubt) = (0, Mask::from_bits(0));
-            for g in listing::groups(met) {
-                if COUNT {
-                    count_pair(groups.of[g].inv_lo, counters);
-                }
-                let mut held = Held::of::<MANY>(groups, g);
-                let met = plane.meet::<ANY, BEHIND, END, EARLY>(&held.line);
-                held.take::<ANY, MANY, BEHIND>(&plane, &met, id);
-                held.put::<ANY, MANY, BEHIND>(groups, g);
-                hits |= u64::from(met.hit()) << g;
-                doubt = doubt | met.doubt();
-            }
+            let (mut hits, mut doubt) = (0, 0);
+            one_ahead(
+                met,
+                groups,
+                |groups, g| plane.values::<ANY, BEHIND, END>(&Line::of(groups, g & (GROUPS - 1))),
+                |groups, g, values| {
+                    let g = g & (GROUPS - 1);
+                    if COUNT {
+                        count_pair(groups.of[g].inv_lo, counters);
+                    }
+                    let mut held = Held::of::<MANY>(groups, g);
+                    let met = plane.meet::<ANY, BEHIND, END, EARLY>(&held.line, &values);
+                    held.take::<ANY, MANY, BEHIND>(&plane, &met, id);
+                    held.put::<ANY, MANY, BEHIND>(groups, g);
+                    let (hit, more) = met.told();
+                    hits |= u64::from(hit) << g;
+                    doubt |= more;
+                },
+            );
             tested.find_all(hits);
             let unsteady = unsteady >> i & 1 != 0;
             again.add(
                 i,
-                if doubt.any() {
+                if doubt != 0 {
                     met
                 } else if unsteady {
                     hits
@@ -206,7 +221,9 @@ fn is_doubtful<const ANY: bool, const MANY: bool, const BEHIND: bool, const END:
     i: usize,
     id: Id,
 ) -> bool {
-    let possible = Plane::of(planes, i).meet::<ANY, BEHIND, END, EARLY>(&Line::of(groups, g)).possible;
+    let (plane, line) = (Plane::of(planes, i), Line::of(groups, g));
+    let values = plane.values::<ANY, BEHIND, END>(&line);
+    let possible = plane.meet::<ANY, BEHIND, END, EARLY>(&line, &values).possible;
     (possible & !id.is_of::<MANY>(groups, g)).any()
 }
 

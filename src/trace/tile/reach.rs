@@ -1,10 +1,13 @@
 //! How far the groups of a tile look: to the ends of their segments, or to what they found.
 
 use super::groups::Groups;
-use super::{HALF_ULP, SET, V};
+use super::{GROUPS, HALF_ULP, SET, SETS, V, listing};
 use crate::lanes::minima::row_minima_of;
 use crate::lanes::words::least;
 use crate::lanes::{LaneMask, Lanes};
+
+/// Up to so many changed groups are looked at one by one, and whole sets from there on.
+const FEW: u32 = 8;
 
 impl Groups {
     /// The ends of the segments, moved apart by what rounding may have done to them.
@@ -34,6 +37,13 @@ impl Groups {
     /// Brings the depths of the `changed` groups up to date.
     #[inline(always)]
     pub fn refresh<const N: usize>(&mut self, changed: u64) {
+        if changed.count_ones() <= FEW {
+            for g in listing::groups(changed) {
+                let near = least(self.of[g].inv_lo) * self.reach;
+                bytemuck::cast_mut::<[V; SETS], [f32; GROUPS]>(&mut self.least)[g] = near;
+            }
+            return self.settle::<N>();
+        }
         for q in (0..N).filter(|q| N == 1 || changed >> (q * SET) & 0xffff != 0) {
             self.look_far(q);
             self.least[q] *= V::splat(self.reach);
