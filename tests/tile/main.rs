@@ -9,6 +9,7 @@ mod engine;
 mod gaps;
 mod instances;
 mod joined;
+mod late;
 mod order;
 mod parallel;
 mod pencil;

@@ -57,7 +57,7 @@ pub struct Chunk<S> {
     pub common: Set,
     /// Whether some ray may be [`Triangle::along_a_face`].
     pub flat: bool,
-    /// Whether some `shift` is too large to compute with.
+    /// Whether some `shift` is too large to compute with, or some ray starts behind its origin: for the exact test.
     pub steep: bool,
     /// Sum of the directions (closest-hit, of at least [`DENSE`] rays with `bounds`).
     pub mean: [S; 3],
@@ -234,7 +234,8 @@ impl<S: Real> Chunk<S> {
         store3(each(|a| product[a] - slack[a]), &mut self.shift[1], at);
         let most = V::constant(V::Scalar::MAX.to_f64() / 4.0);
         let [x, y, z] = map3(product, |x| x.abs().cmp_le(most));
-        self.steep |= !(x & y & z).bits() & live != 0;
+        let ahead = V::constant(0.0).cmp_le(packet.t_min);
+        self.steep |= !(x & y & z & ahead).bits() & live != 0;
         self.flat |= Triangle::along_a_face(packet.dir).bits() & live != 0;
         gauge(packet.org, packet.dir).store(&mut self.gauge[at..]);
         let from_start = packet.t_floor.cmp_lt(packet.t_min);

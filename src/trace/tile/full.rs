@@ -4,68 +4,48 @@
 use super::bundle::{At, Bundle, Shared, Source, TAME, largest, sum};
 use super::columns::{AHEAD, Columns};
 use super::groups::{Groups, NO_SLOT};
+use super::late::Answers;
 use super::parallel::NEAR;
 use super::presumed::Look;
+use super::sure::Sure;
 use super::{SET, V};
 use crate::lanes::minima::quarters;
 use crate::lanes::words::least;
-use crate::lanes::{Lanes, Lanes3, each, map3};
-use crate::ray::Pencil;
-
-/// What is asked of all rays of a block together.
-struct Sure {
-    /// Bits in which numbers are others than they must be.
-    other: V,
-    /// Sum of the numbers that must not be too large.
-    total: V,
-    /// Least size of a direction.
-    shortest: V,
-    /// Least speed along the frame's third axis.
-    slowest: V,
-}
-
-impl Sure {
-    fn new() -> Self {
-        let (zero, infinite) = (V::constant(0.0), V::splat(f32::INFINITY));
-        Self { other: zero, total: zero, shortest: infinite, slowest: infinite }
-    }
-
-    #[inline(always)]
-    fn directions(&mut self, dir: Lanes3<V>) {
-        let size = sum(dir);
-        (self.total, self.shortest) = (self.total + size, self.shortest.fast_min(size));
-    }
-
-    /// Whether no number is another than it must be.
-    #[inline(always)]
-    fn same(&self) -> bool {
-        bytemuck::cast::<_, [u32; 16]>(self.other.to_array()).iter().all(|bits| *bits == 0)
-    }
-
-    /// Whether all rays are what they were taken for.
-    #[inline(always)]
-    fn holds(&self) -> bool {
-        // A sum shows what is no number, and what would overflow in the frame; minima do not.
-        let total: f32 = self.total.to_array().iter().sum();
-        let far = total <= TAME.1 && least(self.shortest) >= 3.0 * TAME.0;
-        self.same() && far && least(self.slowest) >= f32::MIN_POSITIVE
-    }
-}
+use crate::lanes::{Lanes, each, map3};
+use crate::ray::{Pencil, Rays};
 
 impl Groups {
     /// Takes in the `N` sets of a bundle if they are full of such rays; the frame is known. `ANY`: the point may be an end; what
     /// [`Self::load`] wants to know of such rays is added to `look` and `reach`. False if a ray is another or does not go ahead:
     /// nothing that was taken in may be used then.
     #[inline(always)]
-    pub fn fill<const N: usize, const ANY: bool>(&mut self, bundle: &Bundle, look: &mut Look, reach: &mut V) -> bool {
-        if bundle.len != N * SET {
+    pub fn fill<const N: usize, const ANY: bool>(
+        &mut self,
+        bundle: &Bundle,
+        look: &mut Look,
+        reach: &mut V,
+        late: Option<Answers>,
+    ) -> bool {
+        let is_full = bundle.len == N * SET;
+        let ends_at = |rays: &Rays<f32>, end: f32| {
+            bundle.presumed && rays.t_min[bundle.first] == 0.0 && rays.t_max[bundle.first] == end
+        };
+        if let (Shared::Start, Source::Batch(rays)) = (bundle.shared, bundle.source)
+            && is_full
+            && ends_at(rays, f32::INFINITY)
+        {
+            return match late {
+                Some(late) => self.fill_and_write::<N>(bundle, &Columns::of(rays), late),
+                None => self.fill_from_memory::<N>(bundle, &Columns::of(rays)),
+            };
+        }
+        if let Some(late) = late {
+            self.write_all(late);
+        }
+        if !is_full {
             return false;
         }
         match (bundle.shared, bundle.source) {
-            (Shared::Start, Source::Batch(rays)) => {
-                let is_whole = rays.t_min[bundle.first] == 0.0 && rays.t_max[bundle.first] == f32::INFINITY;
-                bundle.presumed && is_whole && self.fill_from_memory::<N>(bundle, &Columns::of(rays))
-            }
             (Shared::Start, Source::Pencil(pencil, middle)) => {
                 let full = bundle.tame[..N * SET].iter().all(|lanes| *lanes == V::ALL);
                 if full {
@@ -74,8 +54,7 @@ impl Groups {
                 full
             }
             (Shared::End(At::One), Source::Batch(rays)) if ANY => {
-                let is_whole = rays.t_min[bundle.first] == 0.0 && rays.t_max[bundle.first] == 1.0;
-                let found = match bundle.presumed && is_whole {
+                let found = match ends_at(rays, 1.0) {
                     true => self.fill_to_end::<N>(bundle, &Columns::of(rays)),
                     false => None,
                 };
@@ -98,12 +77,23 @@ impl Groups {
     /// That they are tame and of the common point is still to be seen.
     #[inline(never)]
     fn fill_from_memory<const N: usize>(&mut self, bundle: &Bundle, columns: &Columns) -> bool {
+        self.fill_after::<N>(bundle, columns, |_, _| ())
+    }
+
+    /// `before`: what is to be done with a group first.
+    #[inline(always)]
+    pub fn fill_after<const N: usize>(
+        &mut self,
+        bundle: &Bundle,
+        columns: &Columns,
+        before: impl FnMut(&Self, usize),
+    ) -> bool {
         let from = bundle.first / V::N;
         let (one, infinite) = (V::constant(1.0), V::splat(f32::INFINITY));
         let apex = bundle.apex.map(V::splat);
         let (frame, asked) = (self.frame, self.asked);
         let mut sure = Sure::new();
-        self.fill_with::<N>(|g| {
+        self.fill_with::<N>(before, |g| {
             columns.prefetch_from(asked, from + g + AHEAD);
             let group = columns.get(from + g);
             let [x, y, z] = each(|a| group.org[a] ^ apex[a]);
@@ -121,19 +111,28 @@ impl Groups {
     fn fill_from_pencil<const N: usize>(&mut self, bundle: &Bundle, pencil: &Pencil, middle: [f64; 2]) {
         let from = bundle.first / V::N;
         let slowness = V::splat(1.0 / self.frame.scale);
-        self.fill_with::<N>(|g| {
-            let [s, t] = pencil.places.around(from + g, middle).map(V::new);
-            [s, t, slowness]
-        });
+        self.fill_with::<N>(
+            |_, _| (),
+            |g| {
+                let [s, t] = pencil.places.around(from + g, middle).map(V::new);
+                [s, t, slowness]
+            },
+        );
     }
 
-    /// `line`: both coordinates of a group's rays, and their parameter per unit of depth.
+    /// `line`: both coordinates of a group's rays, and their parameter per unit of depth. `before`: what is to be done first.
     #[inline(always)]
-    fn fill_with<const N: usize>(&mut self, mut line: impl FnMut(usize) -> [V; 3]) {
+    fn fill_with<const N: usize>(
+        &mut self,
+        mut before: impl FnMut(&Self, usize),
+        mut line: impl FnMut(usize) -> [V; 3],
+    ) {
         let zero = V::constant(0.0);
         for q in 0..N {
             for i in 0..SET {
-                self.put(q * SET + i, line(q * SET + i), zero);
+                let of_group = line(q * SET + i);
+                before(self, q * SET + i);
+                self.put(q * SET + i, of_group, zero);
             }
             self.surround(q);
             self.least[q] = zero;
@@ -229,7 +228,6 @@ mod tests {
     use super::*;
     use crate::lanes::words::greatest;
     use crate::math::Aabb;
-    use crate::ray::Rays;
 
     const POINT: [f32; 3] = [1.5, -2.0, 0.25];
 
@@ -259,7 +257,7 @@ mod tests {
         let mut groups = Box::<Groups>::default();
         groups.frame = Frame::of::<4>(&bundle, u64::MAX, &Aabb { lo: [-3.0; 3], hi: [3.0; 3] })?;
         let (mut look, mut reach) = (Look::default(), V::splat(0.0));
-        let full = groups.fill::<4, true>(&bundle, &mut look, &mut reach) && bundle.confirm(&look);
+        let full = groups.fill::<4, true>(&bundle, &mut look, &mut reach, None) && bundle.confirm(&look);
         full.then(|| (groups, greatest(reach)))
     }
 

@@ -115,7 +115,7 @@ mod tests {
         let bounds = Aabb { lo: [-3.0; 3], hi: [3.0; 3] };
         groups.frame = Frame::of::<N>(&bundle, u64::MAX >> (64 - 16 * N), &bounds).expect("a frame");
         let (mut look, mut reach) = (Look::default(), V::splat(0.0));
-        assert!(groups.fill::<N, false>(&bundle, &mut look, &mut reach));
+        assert!(groups.fill::<N, false>(&bundle, &mut look, &mut reach, None));
         Grid::of::<N>(&groups).map(|grid| (grid, groups))
     }
 

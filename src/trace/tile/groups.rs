@@ -4,6 +4,7 @@ use super::bundle::{Bundle, Shared, Source};
 use super::columns::{AHEAD, Columns};
 use super::even::Even;
 use super::frame::Frame;
+use super::late::Late;
 use super::lines::Lines;
 use super::listing;
 use super::parallel;
@@ -172,13 +173,14 @@ impl Default for Groups {
 
 impl Groups {
     /// Takes in some groups of the first `N` sets of a bundle that looks at `world`. False if they spread too wide for one
-    /// frame (nothing is traced then).
+    /// frame (nothing is traced then). Whatever is `late` of the tile before is written first, if any group is touched.
     #[inline(always)]
     pub fn load<const N: usize, const ANY: bool, const EXACT: bool>(
         &mut self,
         bundle: &mut Bundle,
         groups: u64,
         world: &World<f32>,
+        late: &mut Late,
     ) -> bool {
         self.many = !world.is_single_object();
         let Some(frame) = Frame::of::<N>(bundle, groups, world.tree_bounds()) else { return false };
@@ -196,7 +198,11 @@ impl Groups {
         };
         let from = bundle.first / V::N;
         let all = u64::MAX >> (GROUPS - N * SET);
-        let full = !EXACT && groups == all && self.fill::<N, ANY>(bundle, &mut look, &mut reach);
+        let mut late = late.take();
+        let full = !EXACT && groups == all && self.fill::<N, ANY>(bundle, &mut look, &mut reach, late.take());
+        if let Some(late) = late {
+            self.write_all(late);
+        }
         if full {
             whole = all;
         } else if bundle.presumed && bundle.shared.is_direction() {

@@ -33,6 +33,7 @@ mod gaps;
 mod grid;
 mod groups;
 mod held;
+mod late;
 mod lines;
 mod listing;
 mod mirror;
@@ -49,6 +50,7 @@ mod shapes;
 mod slab;
 mod spans;
 mod starts;
+mod sure;
 mod walk;
 mod written;
 
@@ -61,6 +63,8 @@ use crate::scene::world::World;
 use bundle::{Bundle, Shared, Source};
 use columns::{AHEAD, Next};
 use exact::Exact;
+use late::Late;
+use others::suits;
 use presumed::First;
 
 /// A group's rays: the vector of the whole engine.
@@ -161,21 +165,8 @@ struct Job<'a> {
     most: usize,
     /// Whether hits are written past the caches.
     past: bool,
-}
-
-/// Whether tiles can trace a world: one object in world space, of triangles only; or (not for `exact` tiles) instances
-/// of more triangles than shapes, that no map makes too flat.
-fn suits(world: &World<f32>, exact: bool) -> bool {
-    let shape = match world.is_single_object() {
-        true => !world.kinds.shapes,
-        false => {
-            let steep = world.rounding.growth <= place::MOST_GROWTH;
-            let of_shapes = world.kinds.shapes && world.totals.of_shapes;
-            steep && !(exact || of_shapes || world.top.nodes.is_empty())
-        }
-    };
-    // Triangles are numbered by block and place in 32 bits.
-    shape && !world.kinds.others && world.totals.most_blocks < (u32::MAX / 8) as usize
+    /// First ray of the last tile, if its answers are still to be written.
+    unwritten: Option<usize>,
 }
 
 impl<'a> Job<'a> {
@@ -192,7 +183,7 @@ impl<'a> Job<'a> {
         memory.stack.reserve(world.stack_bound());
         memory.visitors.reserve(world.stack_bound());
         let past = memory.written.past(rays.len(), &output);
-        Self { world, rays, memory, stack, stream, counters, output, most, past }
+        Self { world, rays, memory, stack, stream, counters, output, most, past, unwritten: None }
     }
 
     fn run<const ANY: bool, const EXACT: bool, const COUNT: bool>(&mut self) {
@@ -258,6 +249,7 @@ impl<'a> Job<'a> {
                 }
             }
         }
+        self.write_late();
         if self.memory.left.len() > 0 {
             self.leftovers::<EXACT, COUNT>();
         }
@@ -326,7 +318,8 @@ impl<'a> Job<'a> {
         if groups == 0 {
             return true;
         }
-        if !self.memory.groups.load::<N, ANY, EXACT>(bundle, groups, self.world) {
+        let late = &mut Late { first: &mut self.unwritten, output: &mut self.output };
+        if !self.memory.groups.load::<N, ANY, EXACT>(bundle, groups, self.world, late) {
             return false;
         }
         if bundle.shared != Shared::Behind && self.memory.groups.are_mixed::<N>() {
@@ -344,6 +337,9 @@ impl<'a> Job<'a> {
         walk::walk::<N, ANY, EXACT, COUNT>(self.memory, &exact, groups, self.counters);
         self.memory.groups.asked = exact.next.asked();
         exact.next.ask_sample();
+        if !ANY && !EXACT && N == SETS && self.leave_late::<COUNT>(bundle) {
+            return true;
+        }
         for g in (0..N * SET).filter(|g| groups >> g & 1 != 0) {
             if !self.past {
                 self.output.prefetch(bundle.first + (g + ANSWERS_AHEAD) * V::N);

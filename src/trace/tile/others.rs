@@ -1,11 +1,27 @@
 //! What tiles leave to other kernels: groups to the stream kernel, single odd rays and groups to the packet kernel.
 
 use super::bundle::{self, Bundle, Source};
-use super::{Job, V, listing};
+use super::{Job, V, listing, place};
 use crate::lanes::Lanes;
 use crate::ray::{HitPacket, Packet};
+use crate::scene::world::World;
 use crate::trace::query::Query;
 use crate::trace::{Generic, stream, traverse};
+
+/// Whether tiles can trace a world: one object in world space, of triangles only; or (not for `exact` tiles) instances
+/// of more triangles than shapes, that no map makes too flat.
+pub fn suits(world: &World<f32>, exact: bool) -> bool {
+    let shape = match world.is_single_object() {
+        true => !world.kinds.shapes,
+        false => {
+            let steep = world.rounding.growth <= place::MOST_GROWTH;
+            let of_shapes = world.kinds.shapes && world.totals.of_shapes;
+            steep && !(exact || of_shapes || world.top.nodes.is_empty())
+        }
+    };
+    // Triangles are numbered by block and place in 32 bits.
+    shape && !world.kinds.others && world.totals.most_blocks < (u32::MAX / 8) as usize
+}
 
 impl Job<'_> {
     /// Traces the groups that start at `starts` by the stream kernel; returns the list, empty. `apart`: see [`stream::Job`].

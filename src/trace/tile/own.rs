@@ -260,6 +260,9 @@ impl Groups {
     /// Lanes of a group that hit something, and t, u, v there (elsewhere u and v are 0).
     #[inline(always)]
     fn own_numbers(&self, g: usize, bundle: &Bundle) -> (Mask, V, V, V) {
+        if self.full {
+            return self.whole_numbers(g);
+        }
         let found = Mask::from_bits(!positions(&self.of[g].slot, NO_SLOT));
         let (depth, t) = match &self.frame.parallel {
             Some(parallel) => (V::constant(1.0), self.way_along(parallel, g, bundle)),
@@ -278,6 +281,16 @@ impl Groups {
         (found, t, u, v)
     }
 
+    /// The same of a full tile of rays that start in the common point and have no end.
+    #[inline(always)]
+    pub fn whole_numbers(&self, g: usize) -> (Mask, V, V, V) {
+        let Group { slot, inv_lo, slowness, weights, .. } = &self.of[g];
+        let found = Mask::from_bits(!positions(slot, NO_SLOT));
+        let depth = V::constant(1.0) / *inv_lo;
+        let [u, v] = weights.map(|w| select(found, w * depth, V::constant(0.0)));
+        (found, depth * *slowness, u, v)
+    }
+
     /// Of rays of one direction: their parameters at their hits.
     #[inline(never)]
     fn way_along(&self, parallel: &Parallel, g: usize, bundle: &Bundle) -> V {
@@ -288,9 +301,19 @@ impl Groups {
     /// Writes a group's own hits and misses, by their names. `past`: past the caches.
     #[inline(always)]
     pub fn store_own(&self, g: usize, bundle: &Bundle, to: (&mut Hits<f32>, Option<&Names>), past: bool) {
-        let (hits, names) = to;
-        let (found, t, u, v) = self.own_numbers(g, bundle);
-        let first = bundle.first + g * V::N;
+        self.store(g, bundle.first + g * V::N, self.own_numbers(g, bundle), to, past);
+    }
+
+    /// Writes a group's numbers from ray `first` on.
+    #[inline(always)]
+    pub fn store(
+        &self,
+        g: usize,
+        first: usize,
+        (found, t, u, v): (Mask, V, V, V),
+        (hits, names): (&mut Hits<f32>, Option<&Names>),
+        past: bool,
+    ) {
         let store = |x: &[u32; 16], to: &mut [u32]| store(x, to, first, past);
         let t = select(found, t, V::splat(f32::INFINITY));
         let none = V::splat(f32::from_bits(INVALID_ID));
