@@ -118,9 +118,10 @@ pub struct Planes {
     pub unsteady: u32,
     /// Own answers, rays with a common point behind them: triangles whose `rcp` is not certain, bit by triangle.
     pub flat: u32,
-    /// Own answers: the corners in the frame.
+    /// Own answers, if asked for: the corners in the frame ([`Batch::put_corners`]).
     pub corners: [[[f32; BATCH]; 3]; 3],
-    /// Where the largest value of each linear function over a group lies, s and t: index of [`Groups::rect`] without the set.
+    /// If asked for, where the largest value of each linear function over a group lies, s and t: index of [`Groups::rect`] without
+    /// the set ([`Self::find_corners`]).
     pub corner: [[[u32; BATCH]; 2]; 4],
 }
 
@@ -337,7 +338,6 @@ impl Batch {
         let eps = eps[0].fast_max(eps[1]).fast_max(eps[2]);
         (-eps).store(&mut planes.outside);
         select(edge_on, V::splat(f32::INFINITY), eps).store(&mut planes.inside);
-        planes.corners = map3(*p, |q| map3(q, V::to_array));
         let own = |inverse: V| nearest.fast_min(farthest.fast_max(inverse));
         let [e0, e1, e2] = edges;
         planes.store(groups, &[e0, e1, e2, map3(normal, |n| n * rcp)], eps, own) & in_front & reached | planes.wild
@@ -366,6 +366,18 @@ impl Planes {
         (each(|a| V::splat(self.side[a + 3][i])), way)
     }
 
+    /// Finds out where functions are largest: for who asks set by set.
+    #[inline(always)]
+    pub fn find_corners(&mut self) {
+        let [low, high] = [0, SETS as u32].map(|i| V::splat(f32::from_bits(i)));
+        for (corner, linear) in self.corner.iter_mut().zip(&self.linear) {
+            for (corner, slope) in corner.iter_mut().zip(linear) {
+                let is_low = V::load(slope).cmp_lt(V::constant(0.0));
+                *corner = bytemuck::cast(select(is_low, low, high).to_array());
+            }
+        }
+    }
+
     /// Keeps the linear functions; returns the triangles whose largest values over the tile do not rule them out.
     /// `bound` is the largest 1/z that may be found, from the largest value of its function.
     #[inline(always)]
@@ -375,8 +387,6 @@ impl Planes {
         let mut seen = V::splat(f32::INFINITY);
         for (k, f) in linear.iter().enumerate() {
             let negative = [f[0].cmp_lt(zero), f[1].cmp_lt(zero)];
-            let [low, high] = [0, SETS as u32].map(|i| V::splat(f32::from_bits(i)));
-            self.corner[k] = negative.map(|is_low| bytemuck::cast(select(is_low, low, high).to_array()));
             let (s, t) = (select(negative[0], s0, s1), select(negative[1], t0, t1));
             let value = f[0].mul_add(s, f[1].mul_add(t, f[2]));
             let margin = if k < 3 { value + eps } else { bound(value) - V::splat(groups.nearest) };

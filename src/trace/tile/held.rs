@@ -67,11 +67,16 @@ pub struct Met {
 }
 
 impl Met {
-    /// Whether some ray hit the triangle, and lanes that may have hit it and did not, which are for [`super::own::pair_doubtful`].
+    /// Whether some ray hit the triangle.
     #[inline(always)]
-    pub fn told(&self) -> (bool, u32) {
-        let hit = self.hit.bits();
-        (hit != 0, self.possible.bits() ^ hit)
+    pub fn hit(&self) -> bool {
+        self.hit.any()
+    }
+
+    /// Lanes that may have hit it and did not: for [`super::own::pair_doubtful`].
+    #[inline(always)]
+    pub fn doubt(&self) -> Mask {
+        self.possible & !self.hit
     }
 
     /// A number, as bits of `old` where nothing was hit. Numbers are moved as floats: selection copies bits.

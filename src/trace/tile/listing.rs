@@ -115,7 +115,7 @@ impl Listing {
         seen: u32,
         met_leaves: &[u64],
         groups: &Groups,
-        planes: &Planes,
+        planes: &mut Planes,
     ) {
         (self.len, self.pairs, self.by_groups) = (0, 0, true);
         let Some(wanted) = met_leaves.first_chunk() else { return };
@@ -134,6 +134,7 @@ impl Listing {
             self.group_by_group::<EXACT>(wanted, (seen, any), groups, planes);
         } else {
             (self.met, self.seen) = ([0; BATCH], 0);
+            planes.find_corners();
             for (q, some) in some.into_iter().enumerate().take(N) {
                 self.set::<EXACT>(q, wanted, some, groups, planes);
             }

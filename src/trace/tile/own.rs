@@ -146,6 +146,17 @@ fn pair_edge_on<const MANY: bool>(
     hit.any()
 }
 
+impl Batch {
+    /// Puts the corners where weights are told in f64: few batches need them.
+    #[cold]
+    #[inline(never)]
+    pub fn put_corners(&self, groups: &Groups, planes: &mut Planes) {
+        let p = self.seen(groups, groups.many);
+        let is_flat = groups.frame.parallel.is_some();
+        planes.corners = map3(p, |[x, y, z]| [x, y, if is_flat { V::constant(1.0) } else { z }].map(V::to_array));
+    }
+}
+
 /// Which of the `wanted` lanes of a group meet triangle `i`, and the weights of its second and third corner there, in f64.
 #[inline(always)]
 fn exact_weights(groups: &Groups, planes: &Planes, g: usize, i: usize, wanted: u32) -> (Mask, [V; 2]) {

@@ -7,7 +7,7 @@ use super::groups::Groups;
 use super::held::{Held, Line, Plane};
 use super::listing::{self, triangles};
 use super::own::{self, Id, may_be_inside, pair_doubtful};
-use super::{GROUPS, Memory, V};
+use super::{GROUPS, Mask, Memory, V};
 use crate::lanes::chosen::one_ahead;
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::Counters;
@@ -130,7 +130,7 @@ fn test<
             if sure == 0 {
                 continue;
             }
-            let (mut held, mut hits, mut doubt) = (Held::of::<MANY>(groups, g), 0, 0);
+            let (mut held, mut hits, mut doubt) = (Held::of::<MANY>(groups, g), 0, Mask::from_bits(0));
             let plane = |i: usize| Plane::of(planes, i & (BATCH - 1));
             one_ahead(
                 sure.into(),
@@ -143,19 +143,18 @@ fn test<
                     let plane = plane(i);
                     let met = plane.meet::<ANY, BEHIND, END, EARLY>(&held.line, &values);
                     held.take::<ANY, MANY, BEHIND>(&plane, &met, id(i & (BATCH - 1)));
-                    let (hit, more) = met.told();
-                    hits |= u32::from(hit) << i;
-                    doubt |= more;
+                    hits |= u32::from(met.hit()) << i;
+                    doubt = doubt | met.doubt();
                 },
             );
             held.put::<ANY, MANY, BEHIND>(groups, g);
             tested.find(g, hits.count_ones());
-            again.add(g, if doubt != 0 { sure } else { hits & unsteady }.into());
+            again.add(g, if doubt.any() { sure } else { hits & unsteady }.into());
         }
     } else {
         for i in triangles(listing.seen() & !odd) {
             let (plane, id, met) = (Plane::of(planes, i), id(i), listing.groups(i));
-            let (mut hits, mut doubt) = (0, 0);
+            let (mut hits, mut doubt) = (0, Mask::from_bits(0));
             one_ahead(
                 met,
                 groups,
@@ -169,16 +168,15 @@ fn test<
                     let met = plane.meet::<ANY, BEHIND, END, EARLY>(&held.line, &values);
                     held.take::<ANY, MANY, BEHIND>(&plane, &met, id);
                     held.put::<ANY, MANY, BEHIND>(groups, g);
-                    let (hit, more) = met.told();
-                    hits |= u64::from(hit) << g;
-                    doubt |= more;
+                    hits |= u64::from(met.hit()) << g;
+                    doubt = doubt | met.doubt();
                 },
             );
             tested.find_all(hits);
             let unsteady = unsteady >> i & 1 != 0;
             again.add(
                 i,
-                if doubt != 0 {
+                if doubt.any() {
                     met
                 } else if unsteady {
                     hits
@@ -197,6 +195,9 @@ fn test<
                 tested.find(g, own::decide::<ANY, MANY>(groups, exact, g, batch, i).into());
             }
         });
+    }
+    if again.len > 0 {
+        batch.put_corners(groups, planes);
     }
     for &(of, doubts) in again.of.iter().take(again.len) {
         for other in listing::groups(doubts) {

@@ -310,7 +310,6 @@ impl Batch {
         let eps = eps[0].fast_max(eps[1]).fast_max(eps[2]);
         (-eps).store(&mut planes.outside);
         eps.store(&mut planes.inside);
-        planes.corners = map3(seen, |q| map3(q, V::to_array));
         let [x, y] = [normal[0] * -rcp, normal[1] * -rcp];
         let height = [x, y, (-x).mul_add(p[0][0], (-y).mul_add(p[0][1], a))];
         let within = |k: V| nearest.fast_min(farthest.fast_max(k));
