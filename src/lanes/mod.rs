@@ -12,6 +12,7 @@
 //! In registers a mask is whatever the machine likes ([`Lanes::Mask`]); everywhere else (memory, calls, counters)
 //! masks are bit masks in a `u32`, bit `i` for lane `i`.
 
+pub mod ahead;
 pub mod chosen;
 mod column;
 mod ftz;

@@ -8,7 +8,7 @@ use super::held::{Held, Line, Plane};
 use super::listing::{self, triangles};
 use super::own::{self, Id, may_be_inside, pair_doubtful};
 use super::{GROUPS, Mask, Memory, V};
-use crate::lanes::chosen::one_ahead;
+use crate::lanes::ahead::one_ahead;
 use crate::lanes::{LaneMask, Lanes};
 use crate::ray::Counters;
 
