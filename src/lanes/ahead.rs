@@ -1,7 +1,7 @@
 //! Independent parts that a core would not see next to each other: put there by hand.
 
 /// Whether there are registers for two at once.
-const AHEAD: bool = cfg!(target_feature = "avx512f");
+pub const AHEAD: bool = cfg!(target_feature = "avx512f");
 
 /// Calls `take` for each set bit of `bits`, with what `begin` makes of its number. With AVX-512 the next one is begun before: of what one
 /// takes a core keeps hardly more in sight at once, and waits for each unless there is something else to do. With sixteen registers

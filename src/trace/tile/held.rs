@@ -5,6 +5,7 @@ use super::batch::Planes;
 use super::groups::{Group, Groups, NO_SLOT};
 use super::own::Id;
 use super::{Mask, V, select};
+use crate::lanes::ahead::AHEAD;
 use crate::lanes::{LaneMask, Lanes, Lanes3, dot, each};
 
 /// A group's rays and how far they look.
@@ -139,10 +140,16 @@ impl Plane {
         self.within(line.at(self.linear[3]))
     }
 
+    /// Its edge functions at some rays. Spelled out: vectors of an array that is mapped may end up in memory.
+    #[inline(always)]
+    fn edges_at(&self, line: &Line) -> [V; 3] {
+        [line.at(self.linear[0]), line.at(self.linear[1]), line.at(self.linear[2])]
+    }
+
     /// Its edges against some rays.
     #[inline(always)]
     pub fn edges(&self, line: &Line) -> Edges {
-        self.edges_of([0, 1, 2].map(|k| line.at(self.linear[k])))
+        self.edges_of(self.edges_at(line))
     }
 
     #[inline(always)]
@@ -156,10 +163,16 @@ impl Plane {
     pub fn values<const ANY: bool, const BEHIND: bool, const END: bool>(&self, line: &Line) -> Values {
         let (zero, from_end) = (V::constant(0.0), ANY && END);
         Values {
-            edges: [0, 1, 2].map(|k| line.at(self.linear[k])),
+            edges: self.edges_at(line),
             inverse: if from_end { zero } else { line.at(self.linear[3]) },
             behind: if from_end || BEHIND { self.behind(line) } else { zero },
         }
+    }
+
+    /// 1/z in its plane. Where there are no registers to keep it in it is asked for once edges are decided on.
+    #[inline(always)]
+    fn inverse(&self, line: &Line, values: &Values) -> V {
+        if AHEAD { values.inverse } else { line.at(self.linear[3]) }
     }
 
     /// How far segments begin behind its plane as seen from their common point; in some unit.
@@ -200,7 +213,7 @@ impl Plane {
             let best = raised(line.best, certain, infinite);
             return Met { hit: certain & waiting, possible: possible & waiting, best, weights, ahead };
         }
-        let inverse = self.within(values.inverse);
+        let inverse = self.within(self.inverse(line, values));
         if BEHIND {
             ahead = -values.behind;
             let is_ahead = zero.cmp_le(ahead);
