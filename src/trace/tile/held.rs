@@ -140,7 +140,7 @@ impl Plane {
         self.within(line.at(self.linear[3]))
     }
 
-    /// Its edge functions at some rays. Spelled out: vectors of an array that is mapped may end up in memory.
+    /// Its edge functions at some rays.
     #[inline(always)]
     fn edges_at(&self, line: &Line) -> [V; 3] {
         [line.at(self.linear[0]), line.at(self.linear[1]), line.at(self.linear[2])]
