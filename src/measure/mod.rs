@@ -18,6 +18,7 @@ pub mod raysets;
 pub mod report;
 pub mod rows;
 pub mod scaling;
+pub(crate) mod share;
 pub mod stats;
 pub mod timing;
 pub mod truth;

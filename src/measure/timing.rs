@@ -1,8 +1,8 @@
 //! The clock: passes of an engine over batches of rays that are already packed in memory.
 //!
 //! A pass covers traversal and the writing of hits to memory, nothing else: files are read, trees built, rays packed
-//! and answers allocated before. Threads take batches from a work-stealing pool, each with its own [`Scratch`], and
-//! each is pinned to one core where the system allows it.
+//! and answers allocated before. Each thread has its share of the batches and its own [`Scratch`], helps the others when
+//! it is done, is pinned to one core where the system allows it, and is awake before the clock starts.
 //!
 //! Peers run on the same threads by the same rule. Their rays are packed anew before each pass, outside the clock.
 //!
@@ -10,7 +10,6 @@
 //! a time.
 
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -19,6 +18,7 @@ use crate::lanes::{FlushDenormals, Real};
 use crate::measure::answers::Answers;
 use crate::measure::peers::Peer;
 use crate::measure::raysets::Query;
+use crate::measure::share::share;
 use crate::ray::{Counters, Hits, Pencil, Rays};
 use crate::scene::world::World;
 use crate::trace::{Engine, Scratch};
@@ -166,21 +166,13 @@ impl Workers {
 
     /// Seconds of doing all `jobs`, each with the scratch of the thread that takes it.
     fn timed<T: Send>(&self, mut jobs: Vec<T>, work: impl Fn(&mut T, &mut Scratch) + Sync) -> f64 {
-        let start = Instant::now();
-        let one = |job: &mut T| {
+        share(&mut jobs, |job| {
             let _flushed = self.flushing.then(FlushDenormals::new);
             let thread = rayon::current_thread_index().unwrap_or(0);
             // Only this thread ever takes this lock, so it is free: about 20 ns per batch.
             let mut scratch = self.scratches[thread].lock().unwrap_or_else(PoisonError::into_inner);
             work(job, &mut scratch);
-        };
-        if self.threads() == 1 {
-            jobs.iter_mut().for_each(one);
-        } else {
-            // One by one: pieces as large as rayon would make them end far apart where a picture is sky here and leaves there.
-            jobs.par_iter_mut().with_max_len(1).for_each(one);
-        }
-        start.elapsed().as_secs_f64()
+        })
     }
 
     /// One untimed pass of the counting build of the engine.
@@ -360,22 +352,6 @@ mod tests {
         let workers = Workers::new(1).unwrap();
         assert_eq!(workers.count(&Slab::default(), &world, &batches, Query::Closest).rays, 107);
         assert_eq!(workers.count(&Slab::default(), &world, &batches, Query::Any).rays, 107);
-    }
-
-    /// All the work lies at the end of the list.
-    #[test]
-    fn threads_share_jobs_of_unequal_length() {
-        let (workers, slow) = (Workers::new(2).unwrap(), [AtomicU32::new(0), AtomicU32::new(0)]);
-        workers.install(|| {
-            workers.timed((0..32).collect(), |job, _| {
-                if *job >= 24 {
-                    slow[rayon::current_thread_index().unwrap()].fetch_add(1, Ordering::Relaxed);
-                    std::thread::sleep(std::time::Duration::from_millis(20));
-                }
-            })
-        });
-        let [one, other] = slow.map(AtomicU32::into_inner);
-        assert!(one + other == 8 && one.min(other) >= 3, "{one} and {other}");
     }
 
     #[test]
