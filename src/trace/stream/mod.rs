@@ -19,6 +19,7 @@ mod block;
 mod bounds;
 mod chunk;
 mod due;
+mod engine;
 mod inside;
 mod leaf;
 mod mixed;
@@ -31,19 +32,18 @@ mod signs;
 mod visitors;
 mod walk;
 
-use std::marker::PhantomData;
-
 use super::output::Output;
 use super::query::{Query, Stack};
-use super::{ALWAYS_COUNTS, Engine, Engines, Scratch, traverse};
+use super::traverse;
 use crate::lanes::rows::{Row, to_rows};
 use crate::lanes::words::{prefetch, transpose_bits};
 use crate::lanes::{Lanes, Real};
-use crate::ray::{Counters, HitPacket, Hits, Packet, Rays};
+use crate::ray::{Counters, HitPacket, Packet, Rays};
 use crate::scene::world::World;
 use best::Best;
 use block::Block;
 use chunk::{Chunk, RAYS};
+pub use engine::Stream;
 use inside::Inside;
 use signs::{Signs, is_narrow};
 pub use visitors::{Visit, Visitors, bring_in};
@@ -86,6 +86,8 @@ pub struct Memory<S> {
     sifted: sift::Sifted<S>,
     block: Block<S>,
     savings: neighbours::Savings,
+    /// Whether the last vector of rays was traced as a packet.
+    packets: bool,
 }
 
 impl<S: Real> Default for Memory<S> {
@@ -103,13 +105,10 @@ impl<S: Real> Default for Memory<S> {
             sifted: sift::Sifted::default(),
             block: Block::default(),
             savings: neighbours::Savings::default(),
+            packets: false,
         }
     }
 }
-
-/// The engine; `V`: the vectors of rays.
-#[derive(Clone, Copy, Debug)]
-pub struct Stream<V>(pub PhantomData<fn() -> V>);
 
 /// One call of the engine, or the part of one that another engine leaves to this one.
 pub struct Job<'a, S> {
@@ -144,7 +143,8 @@ impl<S: Real> Job<'_, S> {
         } else {
             let (mut sorted, mut some, mut count) = (0, [0; RAYS], 0);
             for at in starts {
-                if self.is_dead::<V>(at) {
+                self.ask::<V>(at + AHEAD * V::N);
+                if !ANY && self.again::<V, ANY, COUNT>(at) || self.is_dead::<V>(at) {
                     continue;
                 }
                 if ANY && (count > 0 || self.memory.savings.are_worth_trying()) {
@@ -196,19 +196,18 @@ impl<S: Real> Job<'_, S> {
     /// whether there is anything are done too soon for chunks to make up for that.
     #[inline(always)]
     fn among_shapes<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
-        let (packet, t_max, live) = self.load::<V, COUNT>(at);
+        let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
         let alike = live != 0 && (ANY || !self.world.kinds.sorting || Signs::of(&packet).nearly_agree(live));
         if alike {
             self.trace::<V, ANY, COUNT>(at, &packet, t_max, live);
             return 0;
         }
-        self.sort(at, &packet, t_max, live)
+        self.sort::<V, COUNT>(at, &packet, t_max, live)
     }
 
     /// Whether no ray of a vector has a segment; then says that they meet nothing.
     #[inline(always)]
     fn is_dead<V: Lanes<Scalar = S>>(&mut self, at: usize) -> bool {
-        self.ask::<V>(at + AHEAD * V::N);
         let dead = !Packet::<V>::has_segment(self.rays, at);
         if dead && let Output::Closest(hits, _) = &mut self.output {
             HitPacket::new(V::constant(f64::INFINITY)).store(hits, at);
@@ -220,11 +219,24 @@ impl<S: Real> Job<'_, S> {
     /// sorted.
     #[inline(always)]
     fn alike<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
-        let (packet, t_max, live) = self.load::<V, COUNT>(at);
-        if live != 0 && !self.apart && Signs::of(&packet).agree(live) && self.packet::<V, ANY, COUNT>(at, live) {
+        if ANY && self.again::<V, ANY, COUNT>(at) {
             return 0;
         }
-        self.sort(at, &packet, t_max, live)
+        let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
+        let alike = live != 0 && !self.apart && Signs::of(&packet).agree(live) && self.packet::<V, ANY, COUNT>(at);
+        self.memory.packets = alike;
+        match alike {
+            true => 0,
+            false => self.sort::<V, COUNT>(at, &packet, t_max, live),
+        }
+    }
+
+    /// Traces a vector of rays as a packet if the one before was one, as mostly another follows: then its rays are read once.
+    /// False if it is none.
+    #[inline(always)]
+    fn again<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> bool {
+        self.memory.packets = self.memory.packets && !self.apart && self.packet::<V, ANY, COUNT>(at);
+        self.memory.packets
     }
 
     /// Asks the memory for the rays of the vector at `at`, and for the ends of those that come as long after it; of rays without a
@@ -238,18 +250,18 @@ impl<S: Real> Job<'_, S> {
         }
     }
 
-    #[inline(always)]
-    fn load<V: Lanes<Scalar = S>, const COUNT: bool>(&mut self, at: usize) -> (Packet<V>, V, u32) {
-        let loaded = Packet::<V>::load(self.rays, at);
-        if COUNT {
-            self.counters.rays += u64::from(loaded.2.count_ones());
-        }
-        loaded
-    }
-
     /// Sorts the `live` rays of the vector at `at` by octant and dominant axis. Returns how many.
     #[inline(always)]
-    fn sort<V: Lanes<Scalar = S>>(&mut self, at: usize, packet: &Packet<V>, t_max: V, live: u32) -> usize {
+    fn sort<V: Lanes<Scalar = S>, const COUNT: bool>(
+        &mut self,
+        at: usize,
+        packet: &Packet<V>,
+        t_max: V,
+        live: u32,
+    ) -> usize {
+        if COUNT {
+            self.counters.rays += u64::from(live.count_ones());
+        }
         match &mut self.output {
             Output::Closest(hits, _) if live != V::ALL => HitPacket::<V>::new(t_max).store(hits, at),
             Output::Closest(..) => {}
@@ -273,14 +285,16 @@ impl<S: Real> Job<'_, S> {
         live.count_ones() as usize
     }
 
-    /// Traces the `live` rays of one octant and dominant axis that start at `at` as a packet, if they point nearly the
-    /// same way; otherwise returns false. It loads them again: handed over in memory they would cost those that are
-    /// sorted, most of all, 2 to 5 %.
+    /// Traces the vector of rays at `at` as a packet, if they are of one octant and dominant axis and point nearly the same way;
+    /// otherwise returns false. It loads them itself: handed over in memory they would cost those that are sorted, most of all,
+    /// 2 to 5 %.
     #[inline(never)]
-    fn packet<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize, live: u32) -> bool {
-        let (packet, t_max, _) = Packet::<V>::load(self.rays, at);
+    fn packet<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> bool {
+        let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
         let most = if ANY || !self.plain { SPREAD } else { PLAIN_SPREAD };
-        let alike = packet.shear[..2].iter().all(|slope| is_narrow(*slope, most, live));
+        let alike = live != 0
+            && Signs::of(&packet).agree(live)
+            && packet.shear[..2].iter().all(|slope| is_narrow(*slope, most, live));
         if alike {
             self.trace::<V, ANY, COUNT>(at, &packet, t_max, live);
         }
@@ -297,6 +311,9 @@ impl<S: Real> Job<'_, S> {
         live: u32,
     ) {
         let mut query = Query::<V, ANY, COUNT>::new(HitPacket::new(t_max), self.stack, self.counters);
+        if COUNT {
+            query.counters.rays += u64::from(live.count_ones());
+        }
         traverse::world(self.world, packet, &mut query, live);
         let (hit, done) = (query.hit, query.done);
         self.output.put(at, &hit, done);
@@ -329,70 +346,5 @@ impl<S: Real> Job<'_, S> {
             }
         }
         starts.clear();
-    }
-}
-
-impl<V: Lanes> Engine<V::Scalar> for Stream<V>
-where
-    V::Scalar: Engines,
-{
-    fn name(&self) -> &'static str {
-        "stream"
-    }
-
-    fn lanes(&self) -> usize {
-        RAYS
-    }
-
-    fn width(&self) -> usize {
-        V::N
-    }
-
-    fn intersect(
-        &self,
-        world: &World<V::Scalar>,
-        rays: &Rays<V::Scalar>,
-        hits: &mut Hits<V::Scalar>,
-        scratch: &mut Scratch,
-        counters: Option<&mut Counters>,
-    ) {
-        hits.prepare(rays.len());
-        call::<V, false>(world, rays, Output::Closest(hits, world.names.as_ref()), scratch, counters);
-    }
-
-    fn occluded(
-        &self,
-        world: &World<V::Scalar>,
-        rays: &Rays<V::Scalar>,
-        out: &mut Vec<u8>,
-        scratch: &mut Scratch,
-        counters: Option<&mut Counters>,
-    ) {
-        out.clear();
-        out.resize(rays.len(), 0);
-        call::<V, true>(world, rays, Output::Any(out), scratch, counters);
-    }
-}
-
-fn call<V: Lanes, const ANY: bool>(
-    world: &World<V::Scalar>,
-    rays: &Rays<V::Scalar>,
-    output: Output<V::Scalar>,
-    scratch: &mut Scratch,
-    counters: Option<&mut Counters>,
-) where
-    V::Scalar: Engines,
-{
-    let super::Memory { stack, stream: memory } = V::Scalar::memory(scratch);
-    stack.reserve(world.stack_bound());
-    // Hits of the padding are misses, whoever reads whole vectors of them.
-    let end = if ANY { rays.len() } else { rays.padded_len() };
-    let starts = (0..end).step_by(V::N);
-    let (mut unread, count) = (Counters::default(), ALWAYS_COUNTS || counters.is_some());
-    let counters = counters.unwrap_or(&mut unread);
-    let mut job = Job { world, rays, memory, stack, counters, output, apart: false, plain: false };
-    match count {
-        true => job.run::<V, ANY, true>(starts),
-        false => job.run::<V, ANY, false>(starts),
     }
 }
