@@ -143,8 +143,7 @@ impl<S: Real> Job<'_, S> {
         } else {
             let (mut sorted, mut some, mut count) = (0, [0; RAYS], 0);
             for at in starts {
-                self.ask::<V>(at + AHEAD * V::N);
-                if !ANY && self.again::<V, ANY, COUNT>(at) || self.is_dead::<V>(at) {
+                if self.is_dead::<V>(at) {
                     continue;
                 }
                 if ANY && (count > 0 || self.memory.savings.are_worth_trying()) {
@@ -208,6 +207,7 @@ impl<S: Real> Job<'_, S> {
     /// Whether no ray of a vector has a segment; then says that they meet nothing.
     #[inline(always)]
     fn is_dead<V: Lanes<Scalar = S>>(&mut self, at: usize) -> bool {
+        self.ask::<V>(at + AHEAD * V::N);
         let dead = !Packet::<V>::has_segment(self.rays, at);
         if dead && let Output::Closest(hits, _) = &mut self.output {
             HitPacket::new(V::constant(f64::INFINITY)).store(hits, at);
@@ -219,24 +219,19 @@ impl<S: Real> Job<'_, S> {
     /// sorted.
     #[inline(always)]
     fn alike<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> usize {
-        if ANY && self.again::<V, ANY, COUNT>(at) {
+        // After a packet mostly comes another: then its rays are read once.
+        if self.memory.packets && !self.apart && self.packet::<V, ANY, COUNT>(at) {
             return 0;
         }
         let (packet, t_max, live) = Packet::<V>::load(self.rays, at);
-        let alike = live != 0 && !self.apart && Signs::of(&packet).agree(live) && self.packet::<V, ANY, COUNT>(at);
-        self.memory.packets = alike;
-        match alike {
+        self.memory.packets = live != 0
+            && !(self.apart || self.memory.packets)
+            && Signs::of(&packet).agree(live)
+            && self.packet::<V, ANY, COUNT>(at);
+        match self.memory.packets {
             true => 0,
             false => self.sort::<V, COUNT>(at, &packet, t_max, live),
         }
-    }
-
-    /// Traces a vector of rays as a packet if the one before was one, as mostly another follows: then its rays are read once.
-    /// False if it is none.
-    #[inline(always)]
-    fn again<V: Lanes<Scalar = S>, const ANY: bool, const COUNT: bool>(&mut self, at: usize) -> bool {
-        self.memory.packets = self.memory.packets && !self.apart && self.packet::<V, ANY, COUNT>(at);
-        self.memory.packets
     }
 
     /// Asks the memory for the rays of the vector at `at`, and for the ends of those that come as long after it; of rays without a
