@@ -207,7 +207,10 @@ impl<S: Real> Job<'_, S> {
     /// Whether no ray of a vector has a segment; then says that they meet nothing.
     #[inline(always)]
     fn is_dead<V: Lanes<Scalar = S>>(&mut self, at: usize) -> bool {
-        self.ask::<V>(at + AHEAD * V::N);
+        // Packets take long enough for the processor to see for itself what comes next.
+        if !self.memory.packets {
+            self.ask::<V>(at + AHEAD * V::N);
+        }
         let dead = !Packet::<V>::has_segment(self.rays, at);
         if dead && let Output::Closest(hits, _) = &mut self.output {
             HitPacket::new(V::constant(f64::INFINITY)).store(hits, at);
