@@ -1,7 +1,7 @@
 //! The jobs of one timed pass, shared among the threads of a pool.
 //!
 //! Each thread has a run of neighbouring jobs, which need the same parts of a scene, and takes from the far ends of the others' runs
-//! when its own is done. The clock starts when all threads are awake: waking one takes as long as tracing thousands of rays.
+//! when its own is done. The clock starts when all threads are awake: how long the system takes to wake them is not a tracer's doing.
 
 use std::slice::IterMut;
 use std::sync::atomic::{AtomicUsize, Ordering};
