@@ -207,7 +207,7 @@ impl<S: Real> Job<'_, S> {
     /// Whether no ray of a vector has a segment; then says that they meet nothing.
     #[inline(always)]
     fn is_dead<V: Lanes<Scalar = S>>(&mut self, at: usize) -> bool {
-        // Packets take long enough for the processor to see for itself what comes next.
+        // Among packets it costs more than it gives (results/NOTES.md).
         if !self.memory.packets {
             self.ask::<V>(at + AHEAD * V::N);
         }
